@@ -14,7 +14,7 @@ A folder imports only folders and files listed below it:
     events      events and decisions; config: configuration
     orders      orders and commands as people give them
 
-A verb has one meaning in all of them:
+A verb has one meaning in all these modules:
 
     receive, receive_x      take in a message from outside, or a pose, map or plan in it
     record, record_x        keep what the mission itself has found or done

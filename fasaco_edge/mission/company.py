@@ -68,7 +68,7 @@ class Company:
         return cells
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_] | None:
-        """Leave this robot's part of cells tried in vain to the others, also after new maps.
+        """Leave this robot's part of cells tried in vain to the others, until ``try_again``.
 
         Returns:
             The cells that this robot has not given up; None if no others are at work.
@@ -118,5 +118,5 @@ class Waiting:
         return None
 
     def why_stuck(self, now: float) -> str:
-        """Return why the robot seems stuck for good, or ""."""
+        """Return why the robot seems permanently stuck, or ""."""
         return ""

@@ -60,7 +60,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         autostart: whether a mission without an order covers everything once.
         retries: number of times that cells blocked or left over are tried again at the end.
         retry_s: pause before each retry [s].
-        lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
+        lost_pose_s: the pose is lost after this time without a pose [s]; 0 for never.
         stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
         until_min: time after which an order without a time limit of its own ends, with the robot at
             home [min]; 0 for no limit.

@@ -250,7 +250,7 @@ class PlanRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathUpdate:
-    """A path to publish; it replaces the previous one.
+    """A path to publish in place of the previous path.
 
     Attributes:
         revision: counts the published paths, from 1.
@@ -296,7 +296,7 @@ class Decision:
 
     Attributes:
         plan: a plan to make; at most one is pending at a time.
-        path: a path to publish; the last one of the step.
+        path: the path to publish, the last one of the step.
         faults: reasons for refused events, and other faults.
         answers: answers to the commands among the events, in order.
         forgotten: whether the ledger on disk is to be deleted, too.

@@ -22,7 +22,7 @@ from fasaco_edge.mission.work.order_state import AT_HOME, NO_ORDER
 from fasaco_edge.mission.work.sequencer import Sequencer
 from fasaco_edge.text import percent
 
-# A level that differs from the last accepted one by more than JUMP must be repeated for HOLD_S [s].
+# A level that differs from the accepted level by more than JUMP must be repeated for HOLD_S [s].
 JUMP, HOLD_S = 0.05, 5.0
 # The first level is accepted if a level HOLD_S later differs by this much or less.
 COARSE = 0.2
@@ -47,7 +47,7 @@ class BatteryGauge:
     """Filter over battery messages: accepts levels, rejects outliers, measures the drain.
 
     Attributes:
-        level: accepted charge from 0 to 1; None before one is accepted.
+        level: accepted charge from 0 to 1; None before a level is accepted.
         power: state of the power supply, as in the message; "" before the first one.
         received_at: arrival time of the last level, accepted or not [s].
     """
@@ -277,7 +277,7 @@ class Charging:
     def _is_best_to_leave_here(self) -> bool:
         """Return whether charging is due soon, and this is the best place to leave the path.
 
-        Places on the path up to the level of turning back are compared. The best one has the
+        Places on the path up to the level of turning back are compared. The best place has the
         shortest way to the dock, relative to the charge used. The result is False if the path ends
         before that level, as it may be the last path.
         """

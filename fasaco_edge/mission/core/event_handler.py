@@ -1,4 +1,4 @@
-"""Event handler: application of events to the mission's state, before it decides."""
+"""Event handler: application of events to the mission's state, before the mission decides."""
 
 from __future__ import annotations
 
@@ -43,7 +43,6 @@ class EventHandler:
         self.drive, self.battery = parts.lasting.drive, parts.lasting.battery
         self.rooms = parts.lasting.rooms
         self._now = 0.0
-        # Results of the events of one step.
         self._path: PathUpdate | None = None
         self._faults: list[FasacoError] = []
         self._answers: list[Answer] = []
@@ -154,7 +153,7 @@ class EventHandler:
         self._change_building(self.ledger.check(free, frame) if shows_floor else None)
 
     def _compare_buildings(self) -> Pose2D | None:
-        """Compare the newest map with earlier ones; return the robot's pose on the earlier ones."""
+        """Compare the newest map with earlier ones; return the robot's pose on the earlier maps."""
         if self.map.ground.plain is None or self.map.ground.free is None:
             return None
         pose = None if self.map.pose is None else self.map.pose.pose

@@ -27,7 +27,7 @@ class Executive:
 
     @property
     def rules(self) -> tuple[Callable[[], Doing | None], ...]:
-        """The rules, in order; each returns the mission's activity, or None to let the next one
+        """The rules, in order; each returns the mission's activity, or None to let the next rule
         decide."""
         return (
             self._charge_in_time,
@@ -54,7 +54,7 @@ class Executive:
         self.troubles = Troubles(parts)
         self._state, self._reason = State.WAITING_FOR_MAP, "no map yet"
         # State of this step: the time [s], the robot's cell once known, and the path made so far,
-        # which is published unless a rule returns another one.
+        # which is published unless a rule returns another path.
         self._now = 0.0
         self._cell: Cell = 0, 0
         self._update: PathUpdate | None = None
@@ -227,7 +227,7 @@ class Executive:
         return None
 
     def _drive(self) -> Doing:
-        """Drive on; publish the path again to a robot that stands; use spare time."""
+        """Drive on; publish the path again to a robot that stands; request better paths."""
         route, now, update = self.route, self._now, self._update
         state, reason = self._state, self._reason
         if route.requests.pending is not None and not len(route.path.cells):

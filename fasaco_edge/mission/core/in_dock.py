@@ -33,7 +33,7 @@ class InDock:
         The dock may be in a cell that is not coverable: the base drives the last part by itself.
 
         Args:
-            is_charging: whether the mission already counts it as docked.
+            is_charging: whether the mission already counts the robot as docked.
         """
         place, stamped = self.map.places.place("charge"), self.map.pose
         if place is None or stamped is None:

@@ -198,8 +198,8 @@ class LatticeLayout:
         return True
 
     def rotates_back_for(self, maps: Iterable[OccupancyGrid]) -> str:
-        """Change the angle to 0, or the edge to the usual one, if one of the maps does not fit
-        otherwise; return why, "" for no change."""
+        """Change the angle to 0, or the edge to the usual edge, if a map does not fit otherwise;
+        return why, "" for no change."""
         is_usual = (self.deg, self.cell_m) == (self._usual_deg, self._usual_cell_m)
         if is_usual and (self._is_given or not self.deg):
             return ""

@@ -1,7 +1,7 @@
 """Mission: events in, decisions out; owner of map, ledger, order and route.
 
-``step(events, now)`` runs it. It opens no session, reads no clock and touches no file, so a mission
-can be tested and repeated with plain values.
+``step(events, now)`` runs a mission. This opens no session, reads no clock and touches no file, so
+missions can be tested and repeated with plain values.
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ class Mission:
         return self._handler.handle(map(self.rotation.event, events), now)
 
     def _align(self, happened: Decision, now: float) -> Decision:
-        """Lay other cells if the pass or the walls require them; return the combined decision."""
+        """Change the lattice if the pass or the walls require it; return the combined decision."""
         state, grid, pose = self.order_state, self.grid, self.pose
         self._layout.receive_faults(happened.faults)
         # Keep the cells during an errand, for the path set aside, and while the building is in
@@ -227,7 +227,7 @@ class Mission:
         return replace(happened, path=stop or happened.path)
 
     def _fit_map(self, events: Iterable[Event], now: float) -> PathUpdate | None:
-        """Lay the usual cells for a map that does not fit otherwise; return the path, if any."""
+        """Use the usual lattice for a map that does not fit otherwise; return the path, if any."""
         maps = (event.grid for event in events if isinstance(event, MapReceived))
         why = self._layout.rotates_back_for(maps)
         return self._lay_anew(why, now) if why else None
@@ -296,7 +296,7 @@ class Mission:
 
     @property
     def grid(self) -> OccupancyGrid | None:
-        """The newest map; None before there is one."""
+        """The newest map; None before the first map."""
         if self.map.given is not self._laid_grid:
             given = self.map.given
             self._laid_grid, self._given_grid = given, self.rotation.grid(given)
@@ -304,7 +304,7 @@ class Mission:
 
     @property
     def pose(self) -> StampedPose | None:
-        """The newest pose; None before there is one."""
+        """The newest pose; None before the first pose."""
         return self.rotation.pose(self.map.pose)
 
     @property

@@ -29,7 +29,7 @@ from fasaco_edge.mission.work.sequencer import Sequencer
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Lasting:
-    """The parts that stay when cells are laid anew.
+    """The parts that stay when the lattice changes.
 
     Attributes:
         drive: the measured driving.
@@ -50,7 +50,7 @@ class MissionParts:
         map: the newest map, the robot's cell, the reachable cells.
         ledger: the cells covered by this robot and others, and the swept floor.
         monitor: which maps and poses are in use, and which are missing.
-        orders: the order, and what is left of it.
+        orders: the order, and the cells left.
         route: the published path and the pending plan.
         line: the line over the path.
         trail: the trail from which ants start.
@@ -62,7 +62,7 @@ class MissionParts:
         blocked: the follower's report of what blocks the robot.
         standing: how long the robot has not moved.
         changes: orders and commands that change all of these.
-        lasting: the parts that stay when cells are laid anew.
+        lasting: the parts that stay when the lattice changes.
         room_cells: the room of each cell.
     """
 

@@ -25,7 +25,7 @@ class PathChecks:
         self._company = parts.company
         self._orders.describe_floor_by(self._sum_up)
         self._worth_at = self._timed_at = float("-inf")
-        # Number of covered cells and its time [s], while poses are too far apart.
+        # Number of covered cells, and when it was counted [s], while poses are too far apart.
         self._progress: tuple[int, float] | None = None
 
     def check(self, cell: Cell, now: float, *, is_covering: bool) -> None:

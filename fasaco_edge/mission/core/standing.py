@@ -28,14 +28,12 @@ STANDING_S, STANDING_M = 30.0, 0.1
 TRIES = 2
 # A robot counts as turning if its heading has changed this much lately [rad].
 TURNS_RAD = 0.1
-# A robot that stands beside its path gets a new one after this time: an obstacle may separate it
+# A robot that stands beside its path gets a new path after this time: an obstacle may separate it
 # from the path.
 BESIDE_S = 2.0
 
 
 class Standing:
-    """Measures how long the robot stands."""
-
     def __init__(self, map_state: MapState, route: Route) -> None:
         self._map, self._route = map_state, route
         self._now = 0.0
@@ -46,7 +44,7 @@ class Standing:
         self._stay, self._since_ns = Stay(STANDING_M), 0
         # The last time that the robot had a path to drive there, by both clocks.
         self._had_path = 0.0, 0
-        # Number of times that it got its path again there.
+        # Number of times that the robot got its path again there.
         self._tries = 0
         # The robot's yaw when it last turned [rad], and the time of that turn.
         self._yaw, self._turned_at = 0.0, -math.inf
@@ -150,7 +148,7 @@ class Standing:
     def _in_place_s(self) -> float:
         """Return how long the robot has stood in one place with a path to drive.
 
-        It is the longer of the times by our clock and by the robot's, as stamps may stand still.
+        The longer of the times by our clock and by the robot's counts, as stamps may stand still.
         """
         assert self._map.pose is not None
         theirs_s = (self._map.pose.stamp_ns - self._since_ns) * 1e-9

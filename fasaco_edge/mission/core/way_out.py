@@ -32,8 +32,8 @@ TRACK_M, SPACING_M = 40.0, 0.05
 # On the way out the robot may come this much nearer to walls [pixels of the map]: a wall may be a
 # pixel thicker on the map than it is, and the pose off by half a pixel.
 SQUEEZE_PX = 1.5
-# A robot that moves less than STANDING_M [m] on its way out in STANDING_S [s] cannot drive it. It
-# tries again after that time, which doubles with each failure.
+# A robot that moves less than STANDING_M [m] on its way out in STANDING_S [s] cannot drive it. The
+# robot tries again after that time, which doubles with each failure.
 STANDING_M, STANDING_S = 0.1, 15.0
 # The way out leads this many points of the track past the first place where the robot can continue.
 INTO_POINTS = 4

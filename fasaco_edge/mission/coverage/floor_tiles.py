@@ -115,7 +115,7 @@ class Similarity(NamedTuple):
         return cls(origin.y / PIXEL_M, origin.x / PIXEL_M, right, up)
 
     def bounds(self, window: Window) -> Window:
-        """Return the window of this raster that contains ``window`` of the other."""
+        """Return the window of this raster that contains ``window`` of the other raster."""
         corners = [(r, c) for r in (window.row0, window.row1) for c in (window.col0, window.col1)]
         rows = [self.row0 + self.up * col + self.right * row for row, col in corners]
         cols = [self.col0 + self.right * col - self.up * row for row, col in corners]

@@ -1,8 +1,8 @@
 """Loop closures: SLAM corrects the whole map, and moves map and pose at once.
 
 The ledger's cells are places in the map frame. While the tool swept them, the true position of the
-map was somewhere between the old and the new one. So only cells that are covered for every position
-in between still count.
+map was somewhere between the old and the new position. So only cells that are covered for every
+position in between still count.
 
 Small shifts are found by walls alone. A loop closure that moves the map by less than a cell changes
 too few cells for ``has_moved``, and is smaller than the steps between poses of a driving robot. If

@@ -146,7 +146,7 @@ class Curver:
             return np.full(len(xy), pose.yaw)
         ways = np.diff(xy, axis=0)
         along = np.arctan2(ways[:, 1], ways[:, 0])
-        # Short segments get the direction of the next one.
+        # Short segments get the direction of the next segment.
         numbers = np.where(np.hypot(*ways.T) < SHORT_M, len(ways) - 1, np.arange(len(ways)))
         along = along[np.minimum.accumulate(numbers[::-1])[::-1]]
         is_back = np.zeros(len(ways), np.bool_)

@@ -83,7 +83,7 @@ class UnsweptTally:
         self._tally: SweepTally | None = None
         # Window in which causes of unreachable floor may be outdated.
         self._unexplained: Window | None = None
-        # The newest reachable area, and ``_reachable`` of it.
+        # The newest reachable area, and the result of ``_reachable`` for it.
         self._reach: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
         # Window of the last update, with its asked-for and its reachable cells.
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None

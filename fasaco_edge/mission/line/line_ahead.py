@@ -74,7 +74,7 @@ class LineAhead:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the walk was cut off, and the line beyond is kept for the next one."""
+        """Whether the walk was cut off, and the line beyond is kept for the next walk."""
         return self.until < len(self.walk)
 
     def end_at_cut(self) -> None:
@@ -103,7 +103,7 @@ class LineAhead:
         return dropped
 
     def _carry(self, before: GridGeometry) -> None:
-        """Convert to the floor's raster, which has another size or is shifted by part of a pixel.
+        """Convert the line to the floor's raster, of another size or shifted by part of a pixel.
 
         Some mappers begin their maps at the farthest point seen, so that pixels shift with it.
         """
@@ -193,7 +193,7 @@ class LineAhead:
 
     @property
     def beside(self) -> Beside | None:
-        """The robot's offset from the line; None if it does not follow one."""
+        """The robot's offset from the line; None if it does not follow a line."""
         return self._place.beside(self.line.points, self.tally.unit_m) if self.is_followed else None
 
     @property
@@ -242,7 +242,7 @@ class LineAhead:
         return bool(points) and all(self.is_clear(a, b) for a, b in ways)
 
     def put(self, first: int, end: int, points: Points) -> None:
-        """Replace the points from ``first`` to ``end`` by polished ones, and update the counts.
+        """Replace the points from ``first`` to ``end`` by polished points, and update the counts.
 
         The first and the last point stay, and keep their cells.
         """

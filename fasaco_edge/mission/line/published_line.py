@@ -1,4 +1,4 @@
-"""Published line: the line as last published, and the decision when to publish a changed one.
+"""Published line: the line as last published, and the decision when to publish a changed line.
 
 Maps, plans and polishing change the line all the time, mostly far ahead of the robot. A change
 waits until the robot comes near it, as a later change may undo it. The next metres of the published
@@ -38,7 +38,7 @@ NONE: NDArray[np.float64] = np.empty((0, 2))
 
 
 class PublishedLine:
-    """Compares the line with the published one.
+    """Compares the line with the published line.
 
     Args:
         speed_m_s: speed of the robot.
@@ -47,8 +47,8 @@ class PublishedLine:
     def __init__(self, speed_m_s: float) -> None:
         self._near_m = NEAR_M + NEAR_S * speed_m_s
         self._due_m = DUE_M + DUE_S * speed_m_s
-        # The published points; the index of the next one ahead of the robot, and of the last one
-        # that is held.
+        # The published points; the indices of the next point ahead of the robot, and of the last
+        # point that is held.
         self._xy: Points = NONE
         self._next = self._last_held = 0
         # At the last comparison: the number of points, after the line's first, that equal published
@@ -121,7 +121,7 @@ class PublishedLine:
         self._common, self.differs_m = max(len(xy) - 1, 0), math.inf
 
     def reset(self) -> None:
-        """Forget the line: the robot has none, or another one."""
+        """Forget the line: the robot has no line, or another line."""
         self.record_published(NONE, 0)
 
 
@@ -154,7 +154,7 @@ class Publication:
         self._stay = Stay(STANDING_M)
 
     def compare(self, ahead: LineAhead) -> int:
-        """Compare the line with the published one; return how many of its points are held."""
+        """Compare the line with the published line; return how many of its points are held."""
         self.line.compare(ahead.next_xy(COMPARED_POINTS))
         return self.line.held
 

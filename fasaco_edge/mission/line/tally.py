@@ -58,7 +58,7 @@ class SweepTally:
         # Per pixel: flags WANTED, OPEN, SWEPT and PASSED, and why it is out of reach.
         self._state = np.zeros(shape, np.uint8)
         self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
-        # Numbers of wanted pixels, of swept ones among them, and of open ones.
+        # Numbers of wanted pixels, of wanted pixels that are swept, and of open pixels.
         self._wanted_pixels = self._swept_pixels = self._open_pixels = 0
         # Number of pixels out of reach, by cause; the first element is unused.
         self._beyond_pixels = np.zeros(len(OUT_OF_REACH) + 1, np.int64)

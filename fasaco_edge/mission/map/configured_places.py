@@ -70,7 +70,7 @@ class ConfiguredPlaces:
         values = {name: getattr(given, name) for name in self._names}
         of = msgspec.json.encode((values, given.map_frame))
         self._of = f"{zlib.crc32(of):08x}"
-        # The frame in use, "" before there is one; and the last fault reported.
+        # The frame in use, "" before the first map; and the last fault reported.
         self._here = self._said = ""
 
     def enter(self, frame: str) -> PlacesElsewhere | None:

@@ -62,7 +62,7 @@ class InputMonitor:
         self.map_at = now
 
     def receive_pose(self, stamped: StampedPose, now: float) -> bool:
-        """Take in a pose; return whether the track from the last one is unknown."""
+        """Take in a pose; return whether the track from the last pose is unknown."""
         last, lost, pose = self._pose, self.is_pose_lost(now), stamped.pose
         self._pose, self.pose_at, self._has_pose = stamped, now, True
         self.farthest_m = self.on_line_m = 0.0

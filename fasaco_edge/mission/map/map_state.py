@@ -56,7 +56,7 @@ class MapState:
             before the first.
         pose: the newest pose in the map's frame; before the first map, in any frame.
         has_moved: whether the newest map shows walls at other places, after a loop closure.
-        shift: a small shift of the newest map against the previous one; None for none.
+        shift: a small shift of the newest map against the previous map; None for none.
         shows_floor: whether the newest map shows floor; else it gives no evidence of walls.
         area: the reachable area as of the last ``update_area``; None while the robot's pose is on
             no coverable cell.
@@ -240,7 +240,7 @@ class MapState:
         self.area = None
 
     def robot_cell(self) -> Cell | None:
-        """Return the coverable cell at the robot; for a robot in its dock, in front of the dock."""
+        """Return the coverable cell at the robot; in its dock, the cell in front of the dock."""
         lattice, cell = self.ground.lattice, self.path_cell
         if lattice is None or self.pose is None:
             return None

@@ -18,7 +18,7 @@ from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
 from fasaco_edge.grid.polygons import polygon_flaw
 from fasaco_edge.host.documents import StrictDocument
 
-# Limits on the places of an order, as it is part of the ledger, which is written once a second.
+# Limits on the places of an order, which is part of the ledger: this is written once a second.
 MOST_KEEP_OUT = 100
 MOST_POINTS = 1_000
 MOST_POINTS_IN_ALL = 5_000
@@ -98,7 +98,7 @@ def added(keep_outs: KeepOuts, new: KeepOut) -> KeepOuts:
 
 
 def removed(keep_outs: KeepOuts, unwanted: KeepOut) -> KeepOuts:
-    """Return keep-outs without the one that has the name of ``unwanted``.
+    """Return keep-outs without the keep-out that has the name of ``unwanted``.
 
     Raises:
         OrderError: there is no keep-out of this name.

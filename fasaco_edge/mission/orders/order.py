@@ -60,7 +60,7 @@ class Zone:
         holes: polygons within ``polygon`` that are not part of it.
         without: the rooms that a zone of everything leaves out.
         priority: zones of higher priority come first if time or battery do not allow all; None for
-            the room's priority, or the usual one.
+            the room's priority, or the usual priority.
         ranked: the rooms in a zone of everything that have a priority of their own.
         is_as_usual: whether the order gives no passes, so that a room's settings apply.
     """

@@ -34,8 +34,6 @@ class _Before(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class MapMotion:
-    """Moves coverage, reached cells, trail and path with the map."""
-
     _ledger: MissionLedger
     _orders: Sequencer
     _trail: TrailLayer

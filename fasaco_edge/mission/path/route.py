@@ -63,7 +63,7 @@ class Route:
         self._checked_on: ReachableArea | None = None
 
     def continue_from(self, before: Route) -> None:
-        """Continue the counts of another route; a plan pending there is dropped."""
+        """Continue the counts of another route; its pending plan is discarded."""
         self.requests.continue_from(before.requests)
         self.revision = before.revision
         self.unchanged, self.outdated = before.unchanged, before.outdated
@@ -250,7 +250,7 @@ class Route:
         end_yaw: float | None = None,
         beside: NDArray[np.float64] | None = None,
     ) -> PathUpdate:
-        """Publish a path that replaces the current one."""
+        """Publish a path that replaces the current path."""
         self.revision += 1
         self.is_way_out = False
         self._numberings += 1
@@ -266,7 +266,7 @@ class Route:
     def publish_way_out(
         self, way: NDArray[np.float64], reason: str, now: float
     ) -> PathUpdate | None:
-        """Publish a way off the cells, float64 (n, 2): x, y [m], and keep the current path.
+        """Publish a way along no cells, float64 (n, 2): x, y [m], and keep the current path.
 
         Return None for an empty way if there is no path to stop.
         """
@@ -309,7 +309,7 @@ class Route:
             self._kept = held
 
     def stop(self, reason: str, now: float) -> PathUpdate | None:
-        """Publish an empty path and keep the current one; None without a path to drive."""
+        """Publish an empty path and keep the current path; None without a path to drive."""
         if not len(self.path.cells) and not self.is_way_out:
             return None
         kept = self.path_to_keep

@@ -107,7 +107,7 @@ class RoomSheet:
         pending: squares of these regions.
         settled: the squares of rooms some updates ago, without what the newest maps have added.
         changes: scores of possible changes (what, room, other room): a room that may join another,
-            or a part of it that may. Each update that shows a change adds 1, others subtract 2.
+            or a part of a room that may. Each update that shows a change adds 1, others subtract 2.
     """
 
     frame: str
@@ -248,7 +248,7 @@ class RoomBook:
         """Give a room a name; "" removes its name.
 
         Raises:
-            OrderError: there is no such room, another one has that name, or it is no valid name.
+            OrderError: there is no such room, another room has that name, or the name is not valid.
         """
         room = self.room(called)
         if name:

@@ -226,7 +226,7 @@ class Matching:
             self._regions.append(_Region(label, HOLD_CHANGE if parent else HOLD_NEW))
 
     def _count_changes(self) -> list[tuple[str, int, int]]:
-        """Score all pending changes; return those that have lasted."""
+        """Score all pending changes; return the changes that have lasted."""
         scores = dict[tuple[str, int, int], int]()
         for change, score in self._sheet.changes.items():
             if change not in self._changes and score > PENALTY:
@@ -251,7 +251,7 @@ class Matching:
         numbers[inside] = ids[inside]
 
     def _number_regions(self) -> None:
-        """Score the regions that are no rooms yet; those that have lasted become rooms."""
+        """Score the regions that are no rooms yet; regions that have lasted become rooms."""
         sheet, before = self._sheet, self._sheet.pending.on(self._window)
         counts = common_counts(self._labels, before, max(sheet.regions, default=0))
         squares = np.bincount(sheet.pending.ids.ravel(), minlength=counts.shape[1])
@@ -337,7 +337,7 @@ class Matching:
 
 
 def spread(ids: Ids, allowed: NDArray[np.bool_]) -> None:
-    """Give squares without a number the number of the nearest square with one, in place.
+    """Give squares without a number the number of the nearest numbered square, in place.
 
     Distance is counted in steps over edges of squares.
 

@@ -167,7 +167,7 @@ def stale(sheet: RoomSheet, before: Ids) -> list[int]:
 
 
 def refresh(book: RoomBook, changed: Iterable[int]) -> None:
-    """Update outline and area of changed rooms, and neighbours of all."""
+    """Update outline and area of changed rooms, and the neighbours of all rooms."""
     sheet = book.sheet
     rooms = set(changed)
     if sheet is None or not rooms:

@@ -68,7 +68,7 @@ class CellsLeft:
 
     @property
     def frontier_cells(self) -> int:
-        """Number of reachable ordered cells that border on unknown cells of the map."""
+        """Number of reachable cells of the order that border on unknown cells of the map."""
         area = self._map.area
         if area is None:
             return 0

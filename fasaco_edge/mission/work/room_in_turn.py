@@ -16,7 +16,7 @@ NONE = -1
 
 
 class RoomInTurn:
-    """Chooses a room: the robot's own, or else the nearest one with floor left.
+    """Chooses a room: the robot's own, or else the nearest room with floor left.
 
     The room stays chosen until none of its floor is left, or until the robot turns out to be in a
     new room: rooms are known only some time after they were seen. Floor in no room is room 0.
@@ -61,7 +61,7 @@ class RoomInTurn:
         return self._on(lattice) is not self._seen
 
     def choose(self, cells: NDArray[np.bool_], area: ReachableArea, cell: Cell) -> bool:
-        """Choose the room that the next plan covers, see ``first``; return whether it is another.
+        """Choose the room that the next plan covers, see ``first``; return whether it has changed.
 
         Args:
             cells: the reachable cells to cover, bool (rows, cols) of the area.

@@ -54,7 +54,7 @@ class UncoveredArea:
 
     Attributes:
         cells: number of cells.
-        cell: one of them, (row, col) on the lattice.
+        cell: a cell of the area, (row, col) on the lattice.
         reason: why they stay uncovered.
     """
 
@@ -135,8 +135,8 @@ class UncoveredCells:
     def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
         """Return the size of an area, and of all cells that were ever reachable [m2].
 
-        Covered cells count as ever reachable: after a restart no others are known. Cells unknown on
-        the present map do not count: the mapper may have been restarted.
+        Covered cells count as ever reachable: after a restart no other cells are known. Cells
+        unknown on the present map do not count: the mapper may have been restarted.
         """
         once = self._reach.known(area.lattice) | (self._ledger.visits(area.lattice.window) > 0)
         once &= area.lattice.states != UNKNOWN

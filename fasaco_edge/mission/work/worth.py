@@ -39,7 +39,7 @@ def room_priorities(
 
 
 def least_priority(counts: NDArray[np.int64], cell_s: float, may_work_s: float) -> int:
-    """Return the lowest priority that is planned first; 0 if all floor is.
+    """Return the lowest priority that is planned first; 0 if all floor is planned.
 
     Args:
         counts: int64 (101,), number of cells of each priority.
