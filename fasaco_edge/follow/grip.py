@@ -72,7 +72,7 @@ class Rest:
 # poses.
 LEAST_WAY_M, LEAST_SHARE, WAY_M_RAD = 0.2, 0.15, 0.2
 INTERVAL_S, LEAST_POSES = 2.0, 3
-# Pause after the first try [s], doubled after each further one, and number of tries in a direction.
+# Pause after the first try [s], doubled after each further try; number of tries in a direction.
 # After the last try the robot waits until it is moved, or the path leads elsewhere.
 REST_S = 2.0
 TRIES = 3

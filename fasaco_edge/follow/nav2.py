@@ -212,7 +212,7 @@ class Nav2Follower(Supervision):
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended without a reply: if soon, the server is gone."""
         if waited_s < GONE_S:
-            self.take_ending(goal_id, None, "it went away", now)
+            self.take_ending(goal_id, None, "its server has gone", now)
         elif self._active is not None and self._active.id == goal_id:
             self._requests.append(AskResult(goal_id))
 

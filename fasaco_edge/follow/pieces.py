@@ -138,8 +138,8 @@ class PathByLength:
 def end_of_piece(line: PathByLength, start: float, near: float) -> float:
     """Return the end of a piece that begins at ``start``, as arc length [m].
 
-    A piece that must end before the line ends at the last corner if that is near: the robot stops
-    there anyway.
+    A piece that cannot reach the line's end stops at the last corner, if that is near: the robot
+    stops there anyway.
 
     Args:
         line: the path.

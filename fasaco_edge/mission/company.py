@@ -63,7 +63,7 @@ class Company:
     ) -> NDArray[np.bool_]:
         """Return the cells that this robot has to visit.
 
-        With their ``unvisited`` cells given, return the cells on which it has to sweep floor.
+        With ``unvisited``, a part of ``cells``, return the cells on which it has to sweep floor.
         """
         return cells
 

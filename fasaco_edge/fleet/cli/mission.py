@@ -121,7 +121,7 @@ def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
     raise NobodyAnswersError(
         f"no robot of a fleet {one_line(fleet)!r} answers",
         hint=f"{len(statuses)} robots answer, of these fleets: {fleets or 'none'}; "
-        "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
+        "`fleet: {name: ...}` in the configuration of a robot makes it a member",
     )
 
 
@@ -140,7 +140,7 @@ def _member(robot: str, found: list[QueryReply]) -> _Member:
         return _Member(robot, document, "")
     refusal = tolerant(document, replies.Error)
     is_loss = refusal.code == WouldForget.code
-    yes = "; to forget that, give it with --yes" if is_loss else ""
+    yes = "; to forget these cells, give it with --yes" if is_loss else ""
     return _Member(robot, document, f"refused: {refusal.message}{yes}", is_loss)
 
 

@@ -257,5 +257,5 @@ def _no_robot(keys: Keys, view: FleetView) -> NobodyAnswersError:
     return NobodyAnswersError(
         f"no robot of a fleet {one_line(view.fleet)!r} answers",
         hint=f"there are robots of these fleets: {', '.join(sorted(view.others))}; "
-        "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
+        "`fleet: {name: ...}` in the configuration of a robot makes it a member",
     )

@@ -165,7 +165,7 @@ class EventHandler:
         return self.map.building.receive_map(plain, pose, self._now, contradicts)
 
     def _settle_frame(self) -> None:
-        """Assign the map's frame to places and orders without one; drop any of other frames."""
+        """Assign the map's frame to places and orders without one; drop any in other frames."""
         grid, frames = self.map.grid, self.map.frames
         if grid is None or grid.frame != frames.active or not frames.is_settled:
             return

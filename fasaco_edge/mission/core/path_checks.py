@@ -63,7 +63,7 @@ class PathChecks:
 
     def _end_path(self, now: float, why: str = "") -> None:
         if self._orders.scope.is_first_done:
-            self._route.requests.want("what comes first is done: the rest")
+            self._route.requests.want("floor planned first is done: the rest")
         elif self._orders.part.record_path_end(why):
             self._orders.advance(now)
         else:
@@ -99,12 +99,12 @@ class PathChecks:
             return
         self._worth_at = now
         if not self._line.left.is_worth_driving and not self._orders.scope.is_any_planned_left:
-            route.requests.want("others have swept what lay ahead")
+            route.requests.want("others have swept the floor ahead")
 
     def _check_room(self, cell: Cell, _: float) -> None:
         """Ask for a new plan if new rooms show that the robot has another room to finish first."""
         if self._orders.scope.is_in_other_room(cell):
-            self._route.requests.want("rooms have changed: another one first")
+            self._route.requests.want("rooms have changed: another room first")
 
     def _check_time(self, _: Cell, now: float) -> None:
         """Ask for a new plan with the most worthwhile floor first if time or battery do not suffice

@@ -34,7 +34,7 @@ KEPT_SHARE = 0.6
 # robot. The end of a curve shorter than LEAST_M has no certain direction [m].
 AGAIN_M, LEAST_M = 0.5, 0.1
 # The robot has left its curve if its heading is off by ASTRAY_RAD [rad], or its position by
-# ASTRAY_M [m]. The curve then begins anew at its pose, but not again within MOVED_M [m].
+# ASTRAY_M [m]. The curve then begins at the robot's pose, but not again within MOVED_M.
 ASTRAY_RAD, ASTRAY_M, MOVED_M = math.radians(35.0), 0.1, 0.05
 # Segments of the published line shorter than this have no direction of their own [m].
 SHORT_M = 2e-3
