@@ -45,7 +45,7 @@ class Messages:
             mission.covered.current.snapshot().tiles,
         )
         if layer.others.shared.epoch != self._epoch:
-            # All tiles are sent again in a new epoch. Before the first epoch, swept cells are
+            # All tiles are sent again in a new epoch. Cells swept before the first epoch are
             # unknown.
             before = tiles if self._epoch else None
             self._epoch, self._swept, most = (

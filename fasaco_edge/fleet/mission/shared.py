@@ -221,7 +221,7 @@ class SharedProgress(OthersCells):
             inside: returns which cells are chosen, bool (n,), for rows and columns, int64 (n,).
         """
         for place in self._places():
-            # Once for all robots, as ``inside`` takes most of the time.
+            # Called once for all robots, as ``inside`` takes most of the time.
             swept = (one.tiles[place] for one in self._robots.values() if place in one.tiles)
             at = np.argwhere(unpacked(np.bitwise_or.reduce(list(swept))))
             rows, cols = (at + np.multiply(place, TILE)).T

@@ -1,8 +1,8 @@
 """Shared work of a fleet: the robots that take part, the cells left, and the newest division.
 
-A robot without a part stands still while the others make progress, so as not to obstruct them. Of
-two divisions, the one with the higher number is newer; between equal numbers the author whose name
-sorts first wins. Numbers too far ahead are errors of their sender.
+A robot without a part stands still while the others make progress, so as not to obstruct them. The
+division with the higher number is newer; between equal numbers, the author whose name sorts first
+wins. Numbers too far ahead are errors of their sender.
 """
 
 from __future__ import annotations

@@ -100,8 +100,8 @@ def obstruction(
 ) -> Obstruction | None:
     """Return a robot's obstruction; None if there is none.
 
-    A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. Of two
-    robots, the first is the one whose name sorts first. It is this robot's turn if it is the first,
+    A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. The first
+    of two robots is the robot whose name sorts first. It is this robot's turn if it is the first,
     has a path, and both wait for each other. For each other robot, the first row applies in which
     both conditions hold; "is blocked" is returned only if no robot leads to another decision.
 

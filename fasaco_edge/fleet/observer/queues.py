@@ -164,7 +164,7 @@ class FleetSubscriptions:
             self._listen(robot, topic)
 
     def ask_for_maps(self, robots: Sequence[str], now_ns: int) -> None:
-        """Ask robots for their maps, one after another; call it often.
+        """Ask robots for their maps, one after another; to be called often.
 
         Args:
             robots: their names.

@@ -206,7 +206,7 @@ class FleetScene:
         self._writer.log(entities.FLEET_LOG, rr.TextLog(line, level=level))
 
     def catch_up(self) -> None:
-        """Make the drawings that are due; call it often."""
+        """Make the drawings that are due; to be called often."""
         self._layers.catch_up(self._writer.wall_ns)
 
     def describe(self, title: str) -> None:

@@ -148,7 +148,7 @@ class FleetFeed(BusJoining):
         self._subscriptions: FleetSubscriptions | None = None
 
     def attend(self, robots: Collection[str]) -> None:
-        """Subscribe to the robots with these names; call it often."""
+        """Subscribe to the robots with these names; to be called often."""
         if (subscriptions := self._subscriptions) is not None:
             for robot in set(robots) - subscriptions.robots:
                 subscriptions.subscribe(robot)

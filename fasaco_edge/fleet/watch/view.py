@@ -144,7 +144,7 @@ class FleetView:
             self._note_often(robot, arrival.topic, text, 1e-9 * arrival.wall_ns)
 
     def tick(self, now: float) -> None:
-        """Note changes up to ``now``, time since the epoch [s]; call it often."""
+        """Note changes up to ``now``, time since the epoch [s]; to be called often."""
         now_ns = int(1e9 * now)
         divider = self.members.dividing(now_ns)
         self._look_at_floor(divider, now_ns)
