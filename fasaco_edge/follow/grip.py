@@ -23,9 +23,9 @@ MEAN_S = 1.0
 # The robot was moved if an average pose is MOVED_M [m] or more from the average pose MEANS averages
 # earlier; slower motion is drift of the poses.
 MOVED_M, MEANS = 0.1, 5
-# For noise, SCATTERS times the median step from one average to the next is added to that distance.
-# Number of last steps in the median, and least number. The few steps of a moved robot hardly change
-# the median. Normally distributed noise moves only one average in 2^16 that far.
+# Noise adds SCATTERS times the median step from one average to the next to that distance. Number of
+# last steps in the median, and least number. The few steps of a moved robot hardly change the
+# median. Normally distributed noise moves only one average in 2^16 that far.
 SCATTERS, STEPS, LEAST_STEPS = 4.0, 30, 6
 
 # Position and turn, as lengths [m].
