@@ -1,4 +1,4 @@
-"""In dock: whether the robot is in its dock, and whether its battery charges there.
+"""Docking state: whether the robot is in its dock, and whether its battery charges there.
 
 No single message decides: levels rise slowly and in coarse steps, some batteries report the wrong
 power supply status, and a bad contact is intermittent.

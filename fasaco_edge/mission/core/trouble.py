@@ -23,7 +23,7 @@ IMPOSSIBLE_S = 20.0
 
 # States of a robot that drives, or soon will.
 DRIVING = frozenset((State.PLANNING, State.COVERING, State.RETURNING))
-# States of a mission under way. In the others the robot may be switched off.
+# States of a mission under way. In other states the robot may be switched off.
 UNDER_WAY = frozenset(State) - {State.IDLE, State.DONE}
 
 

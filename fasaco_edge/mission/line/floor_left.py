@@ -137,7 +137,7 @@ class UnsweptTally:
         asked, pose = self._orders.cells.asked_of_me(self._map.area), stamped.pose
         lost = self._orders.reach.lost(self._map.area)
         if self._tally is not None:
-            # For the whole order, not only for its last part.
+            # Update the tally for the whole order, not only for its last part.
             self.update()
         thinner_m = grid.geometry.resolution
         self._possible_m2 = possible_m2(floor, thinner_m, (pose.x, pose.y), asked, lost)

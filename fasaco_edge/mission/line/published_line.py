@@ -22,8 +22,8 @@ from fasaco_edge.mission.line.polyline import POLISHED, Points
 from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.path.route import Route
 
-# A change nearer than NEAR_M [m], or NEAR_S [s] of driving, is published at once, as the robot
-# needs that much to stop; unless the robot can drive on along the published line.
+# A change nearer than NEAR_M [m], or NEAR_S [s] of driving, is published at once, unless the robot
+# can drive on along the published line: the robot needs that much to stop.
 NEAR_M, NEAR_S = 1.0, 1.0
 # A change nearer than DUE_M [m], or DUE_S [s] of driving, waits up to PATIENCE_S [s] for a plan or
 # for polish: a line that a map has cut off gets a new plan within that time.

@@ -82,7 +82,7 @@ def viewpoints_beside(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -
     """Return a reachable cell beside each closed area, to look at it; array indices.
 
     Areas without a square of two by two cells are left out, as single rows of cells along walls are
-    noise of the map. At most MOST_VIEWPOINTS, for the largest areas.
+    noise of the map. There are at most MOST_VIEWPOINTS, for the largest areas.
     """
     areas = find_areas(closed.view(np.uint8))
     beside = cells_beside(areas, reachable)

@@ -176,7 +176,7 @@ class WorthFirst:
 
     def _given_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int8]:
         if self._on_cells is None or self._on_cells[0] != window:
-            # In blocks of rows, as coordinates take far more memory than cells.
+            # Computed in blocks of rows, as coordinates take far more memory than cells.
             on_cells = np.empty((window.rows, window.cols), np.int8)
             for part in window.strips(BLOCK):
                 values = given.geometry.values_at(given.cells, centres(part, self._cell_m), -1)
