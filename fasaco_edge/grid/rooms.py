@@ -4,7 +4,7 @@ Free-standing furniture is ignored. Doors are narrow gaps between the ends of wa
 the end of a narrow passage (``kernels.rooms.doors``). Each door and mouth is cut, and each
 connected part is then a region. A region too small for a room is joined to a neighbour through its
 least certain door or mouth. On an incomplete map, a room is found once enough of its floor has been
-seen.
+seen; less floor, seen through a door, belongs to no room yet.
 """
 
 from __future__ import annotations
@@ -40,6 +40,9 @@ LONGEST_M, SMALL_M, THICK_M = 2.5, 0.6, 0.3
 # Around the edge of the explored floor, unknown pixels up to this distance belong to an unseen part
 # of the building [m].
 OPEN_M = 0.5
+# A region is half seen if the square of the length of its edge to unknown floor is at least this
+# multiple of its area; the smallest half-seen region behind a door that is a room [m2].
+OPEN_RATIO, HALF_SEEN_M2 = 4.0, 0.75
 # Largest ratio of unknown to wall pixels beside free pixels. Above it the map does not mark walls,
 # and all pixels that are not free count as wall.
 MOST_UNMARKED = 4
@@ -54,6 +57,8 @@ _RING = [(row, _HALF) for row in range(1 - _HALF, _HALF + 1)] + [
 _DIRECTIONS = np.array(_RING) / np.sqrt((np.array(_RING) ** 2).sum(axis=1, keepdims=True))
 # Certainty of a cut by hand, above that of any door.
 _BY_HAND = 9.0
+# Number of a region that belongs to no room yet.
+_NOT_YET = -1
 # Pixels processed at once in arrays of larger types.
 BLOCK = 1 << 16
 _NO_LINK = (0.0, 0.0)
@@ -92,10 +97,15 @@ def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) ->
     labels = find_areas(open_floor).labels
     del open_floor
     sizes = _counted(labels, free) * geometry.resolution**2
-    rooms, count = _numbered(_joined(doors, beside_cuts(labels, doors), sizes))
+    edges = _counted(labels, free & beside(kinds == _UNKNOWN)) * geometry.resolution
+    rooms, count = _numbered(_joined(doors, beside_cuts(labels, doors), sizes, edges))
     whole = Window(0, 0, *labels.shape)
     for strip in whole.strips(BLOCK):
-        labels[strip.slices_in(whole)] = rooms[labels[strip.slices_in(whole)]]
+        at = strip.slices_in(whole)
+        room = rooms[labels[at]]
+        # Rooms do not grow over floor of a room that will be found later.
+        solid[at] |= room == _NOT_YET
+        labels[at] = np.maximum(room, 0)
     grow(labels, ~solid)
     labels[~free] = 0
     return FoundRooms(geometry, labels, count)
@@ -109,16 +119,21 @@ def _solid_and_doors(
     things = furniture(
         ~free, FurnitureLimits(round(LONGEST_M / pixel_m), SMALL_M / pixel_m, THICK_M / pixel_m)
     )
-    solid = ~free & ~things
-    pixels = RoomPixels(
-        clearances(solid, round(CLEAR_M / pixel_m)),
-        solid,
-        (kinds == _WALL) & ~things,
-        _unseen(kinds, pixel_m),
-    )
+    solid, unseen = ~free & ~things, _unseen(kinds, pixel_m)
+    walls = (kinds == _WALL) & ~things
     reach, passage = round(BESIDE_M / pixel_m), round(PASSAGE_M / pixel_m)
     limits = DoorLimits(DOOR_M / pixel_m, WALL_M / pixel_m, reach, passage)
-    return solid, find_doors(pixels, _DIRECTIONS, limits)
+    near = round(CLEAR_M / pixel_m)
+    clearance = clearances(solid, near)
+    doors = find_doors(RoomPixels(clearance, solid, walls, unseen), ~solid, _DIRECTIONS, limits)
+    if not unseen.any():
+        return solid, doors
+    # What is seen through a door narrows beyond it: as if unseen floor were free, it widens.
+    closed = solid & ~unseen
+    wider = clearances(closed, near)
+    pixels = RoomPixels(wider, closed, walls, unseen)
+    more = find_doors(pixels, (clearance != wider) & ~solid, _DIRECTIONS, limits)
+    return solid, np.concatenate([doors, more])
 
 
 def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -133,10 +148,10 @@ def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.f
 
 def _numbered(rooms: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
     """Return the room of each region, numbered in order of regions; and the number of rooms."""
-    names = dict.fromkeys(room for room in rooms.tolist() if room)
+    names = dict.fromkeys(room for room in rooms.tolist() if room > 0)
     numbers = np.zeros(len(rooms), np.int32)
     numbers[list(names)] = np.arange(1, len(names) + 1)
-    return numbers[rooms], len(names)
+    return np.where(rooms > 0, numbers[rooms], rooms), len(names)
 
 
 _UNKNOWN, _FREE, _WALL = 0, 1, 2
@@ -196,14 +211,21 @@ def _by_hand(cuts: Sequence[tuple[Point, Point]], geometry: GridGeometry) -> NDA
 
 
 def _joined(
-    doors: NDArray[np.float64], beside: NDArray[np.int32], sizes: NDArray[np.float64]
+    doors: NDArray[np.float64],
+    beside: NDArray[np.int32],
+    sizes: NDArray[np.float64],
+    edges: NDArray[np.float64],
 ) -> NDArray[np.int32]:
-    """Return the room of each region, int32 (n,), 0 for none, with small ones joined to others.
+    """Return the room of each region, with small ones joined to others.
 
     Args:
         doors: float64 (m, 5), see ``find_doors``.
         beside: int32 (m, 2), the regions on both sides of each door.
         sizes: float64 (n,), free floor of each region [m2]; that of region 0 has no meaning.
+        edges: float64 (n,), length of its edge to unknown floor [m].
+
+    Returns:
+        int32 (n,), 0 for none, ``_NOT_YET`` for little floor of a room that is half seen.
     """
     downs, rights = doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1]
     squares = downs * downs + rights * rights
@@ -215,11 +237,19 @@ def _joined(
             best = max(links[one].get(other, _NO_LINK), (kind, narrow))
             links[one][other] = links[other][one] = best
     floor: list[float] = sizes.tolist()
+    edge: list[float] = edges.tolist()
     into = list(range(len(sizes)))
 
+    def has_door(room: int) -> bool:
+        return any(kind >= LEAST_SURE for kind, _ in links[room].values())
+
+    def is_half_seen(room: int) -> bool:
+        return has_door(room) and edge[room] * edge[room] >= OPEN_RATIO * floor[room]
+
     def is_small(room: int) -> bool:
-        has_door = any(kind >= LEAST_SURE for kind, _ in links[room].values())
-        return floor[room] < (ROOM_M2 if has_door else WITHOUT_DOOR_M2)
+        if is_half_seen(room):
+            return floor[room] < HALF_SEEN_M2
+        return floor[room] < (ROOM_M2 if has_door(room) else WITHOUT_DOOR_M2)
 
     small = [(floor[room], room) for room, to in enumerate(links) if to and is_small(room)]
     heapq.heapify(small)
@@ -231,10 +261,11 @@ def _joined(
         (kind, _), _, other = min(
             (link, floor[there], there) for there, link in links[room].items()
         )
-        if kind == _BY_HAND:
+        if kind == _BY_HAND or (kind >= LEAST_SURE and is_half_seen(room)):
             continue
         into[room] = other
         floor[other] += size
+        edge[other] += edge[room]
         for third, link in links[room].items():
             del links[third][room]
             if third != other:
@@ -248,7 +279,11 @@ def _joined(
         while into[room] != room:
             room = into[room]
         into[region] = room
+        if not floor[room]:
+            continue
         is_cut = any(kind == _BY_HAND for kind, _ in links[room].values())
-        if floor[room] >= (0.0 if is_cut else ROOM_M2) and floor[room] > 0.0:
+        if is_cut or floor[room] >= (HALF_SEEN_M2 if is_half_seen(room) else ROOM_M2):
             rooms[region] = room
+        elif is_half_seen(room):
+            rooms[region] = _NOT_YET
     return rooms

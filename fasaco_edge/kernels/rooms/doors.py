@@ -289,7 +289,10 @@ def _door_at(
 
 @kernel
 def find_doors(
-    pixels: RoomPixels, directions: NDArray[np.float64], limits: DoorLimits
+    pixels: RoomPixels,
+    middles: NDArray[np.bool_],
+    directions: NDArray[np.float64],
+    limits: DoorLimits,
 ) -> NDArray[np.float64]:
     """Return the chords of all doors and mouths of passages, several of each, float64 (n, 5).
 
@@ -298,6 +301,7 @@ def find_doors(
 
     Args:
         pixels: what the pixels are.
+        middles: pixels through which chords are looked for, bool (rows, cols).
         directions: of the chords, unit vectors (row, col), float64 (m, 2), over half a turn.
         limits: what a door measures.
     """
@@ -306,7 +310,7 @@ def find_doors(
     doors, count = np.empty((MOST_GAPS, 5)), 0
     for row in range(1, rows - 1):
         for col in range(1, cols - 1):
-            if not 4 <= pixels.clearance[row, col] <= most:
+            if not (middles[row, col] and 4 <= pixels.clearance[row, col] <= most):
                 continue
             if count < MOST_GAPS and _is_ridge(pixels.clearance, row, col):
                 count += _door_at(pixels, (row, col), directions, limits, doors[count])
