@@ -63,7 +63,7 @@ def _tool(robot: RobotConfig) -> Iterator[str]:
         yield (
             f"robot.speed_m_s {robot.speed_m_s:g} beside robot.tool_width_m "
             f"{robot.tool_width_m:g}: floor counts as swept only if a pose comes at least "
-            f"{needed_hz:.0f} times a second; between poses farther apart it does not"
+            f"{needed_hz:.0f} times a second; floor between poses farther apart does not count"
         )
 
 
