@@ -22,7 +22,7 @@ from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.replies import UnreachedArea, ZoneReport
 
 ENDS = ("cancel", "reset")
-# States without an order in force: in them even the same order begins anew.
+# States without an order in force: in these states even an equal order begins anew.
 OVER = ("done", "idle")
 
 
