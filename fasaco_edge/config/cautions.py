@@ -36,7 +36,6 @@ def cautions(config: DaemonConfig) -> list[str]:
 
 
 def log_cautions(config: DaemonConfig) -> None:
-    """Log the cautions."""
     for text in cautions(config):
         LOG.warning("%s", text, extra={"event": "caution"})
 

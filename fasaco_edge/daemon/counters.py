@@ -30,7 +30,6 @@ def log_fault(log: logging.Logger, fault: FasacoError) -> str:
 
 
 def fault_text(fault: FasacoError) -> str:
-    """Return a fault with its hint."""
     return f"{fault}: {fault.hint}" if fault.hint else str(fault)
 
 

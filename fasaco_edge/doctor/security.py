@@ -95,7 +95,7 @@ def identity(context: CheckContext) -> Finding:
     bus = context.config.bus
     security, listens = bus.security, bool(bus.listen)
     if security.kind == "none":
-        return ok("no authentication, neither way")
+        return ok("no authentication in either direction")
     try:
         security.of_daemon(context.config.keys().prefix)
         if security.kind == "user":

@@ -72,7 +72,6 @@ def _document(order: MissionOrder) -> OrderDocument:
 
 
 def order_words(order: OrderDocument) -> str:
-    """Return an order as text."""
     asked = [f"zone {zone.name}" + passes_words(zone.passes or 1) for zone in order.zones] or [
         "everything" + passes_words(order.passes or 1)
     ]

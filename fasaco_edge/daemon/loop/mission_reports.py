@@ -151,7 +151,6 @@ def _largest_first(*parts: tuple[float, str]) -> tuple[FloorLeft, ...]:
 
 
 def plan_counts(mission: Mission | None) -> PlanCounts:
-    """Return the counts of plans."""
     if mission is None:
         return PlanCounts()
     route = mission.route

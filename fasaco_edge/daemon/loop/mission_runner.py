@@ -195,7 +195,6 @@ class MissionRunner:
             self._before = None
 
     def submit(self, request: PlanRequest) -> None:
-        """Submit a plan request."""
         assert self.worker is not None
         self.worker.submit(request)
 
@@ -233,7 +232,6 @@ class HeldEvents:
 
     @property
     def has_map(self) -> bool:
-        """Whether there is a map."""
         return any(kind is MapReceived for kind, _ in self._held)
 
     def take(self, events: Sequence[Event]) -> list[FasacoError]:

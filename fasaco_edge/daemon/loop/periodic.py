@@ -83,7 +83,6 @@ class CoveragePublisher:
         self._outbox, self._due = outbox, Due()
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish the coverage if that is due."""
         # An order may reset the coverage, and add keep-out cells.
         key = (mission.covered.version, mission.map.map_revision, mission.order_state)
         lattice, grid = mission.lattice, mission.grid
@@ -103,7 +102,6 @@ class FloorPublisher:
         self._outbox, self._due = outbox, Due()
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish the swept floor if that is due."""
         if not self._outbox.has_listeners(FLOOR):
             self._due.forget()  # the next listener has not received it
             return
@@ -125,7 +123,6 @@ class UnsweptPublisher:
         self._outbox, self._due = outbox, Due()
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish the unswept floor if that is due."""
         if not self._outbox.has_listeners(UNSWEPT):
             self._due.forget()  # the next listener has not received it
             return
@@ -147,7 +144,6 @@ class TrailPublisher:
         self._outbox, self._due = outbox, Due()
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish or keep the trail if due."""
         is_wanted = any(map(self._outbox.has_listeners, (PHEROMONE, DIRECTIONS)))
         trail, lattice, grid = mission.trail, mission.lattice, mission.grid
         key = (trail, trail.changes, is_wanted)
@@ -245,7 +241,6 @@ class RoomsPublisher:
         self._shares = RoomShares()
 
     def publish(self, mission: Mission | None, now: float) -> None:
-        """Publish the rooms if that is due."""
         book, progress_id = self._book, None if mission is None else _progress_of(mission)
         # Another order may have forgotten the coverage of the previous order.
         order = None if mission is None else mission.order_state.order

@@ -177,7 +177,6 @@ class AreaDrawing:
                 self._draw(entity, areas, style)
 
     def add_rooms(self, rooms: Sequence[Named]) -> None:
-        """Draw rooms."""
         if self._is_new(entities.ROOMS, rooms):
             size = 2 * POINT_BYTES * sum(len(outline or ()) for _, outline in rooms)
             self._layers.draw(

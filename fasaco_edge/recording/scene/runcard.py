@@ -49,7 +49,6 @@ class RunDescription:
 
     @property
     def name(self) -> str:
-        """The name of the run."""
         return f"{self.robot} {self.began}"
 
     def markdown(self) -> str:

@@ -65,7 +65,6 @@ class Scene:
         self._draw_robot(DEFAULT_RADIUS_M)
 
     def add_map(self, grid: OccupancyGrid) -> None:
-        """Draw the map."""
         self._draw_grid(self._anchored(grid.geometry.origin).grid(grid))
 
     def _draw_grid(self, grid: OccupancyGrid) -> None:
@@ -181,7 +180,6 @@ class Scene:
             self.add_line(log, f"{state}: {reason}")
 
     def add_line(self, log: str, message: str, level: str = "INFO") -> None:
-        """Add a line to a log."""
         self._writer.log(log, rr.TextLog(message, level=level))
 
     def catch_up(self) -> None:
