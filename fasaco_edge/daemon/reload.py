@@ -25,8 +25,8 @@ from fasaco_edge.host.processes import memory_limit
 
 LOG = logging.getLogger(__name__)
 
-# Sections and keys that can change in a running daemon, without those that opened session, ledger
-# or another process.
+# Sections and keys that can change in a running daemon; not those with which session, ledger or
+# another process was opened.
 CHANGEABLE = frozenset(
     {
         "planner",

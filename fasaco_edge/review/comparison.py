@@ -18,7 +18,7 @@ ANOTHER_PROBLEM = (
     *("building", "orders"),
 )
 NOT_KNOWN = "not known"
-# Most difference between the sides of two maps of the same building [m].
+# Largest difference between the sides of two maps of the same building [m].
 SIDE_M = 1.0
 
 Difference = tuple[str, str, str]

@@ -75,7 +75,6 @@ def _rows(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet
 
 
 def state_colour(state: str) -> str:
-    """Return the colour of a state."""
     return STATE_COLOURS.get(state, "bright_black")
 
 

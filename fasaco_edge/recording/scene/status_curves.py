@@ -1,7 +1,7 @@
 """Curves of figures over time: a figure is drawn only when it changes.
 
-Each flush, once a second, begins a chunk for each entity drawn since the last one: an entity drawn
-once a second takes five megabytes an hour, whatever its content.
+Each flush, once a second, begins a chunk for each entity drawn since the last flush: an entity
+drawn once a second takes five megabytes an hour, whatever its content.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ CURVES: tuple[tuple[str, str, Colour], ...] = (
     (entities.LINE_GAP, "gap of the line", (52, 211, 153)),
     (entities.SAVED_BY_ANTS, "ants", (244, 114, 182)),
     (entities.SAVED_BY_LOCAL_SEARCH, "local search", (56, 152, 222)),
-    (f"{entities.MEMORY}/planner", "planner MB", (167, 139, 250)),
+    (f"{entities.MEMORY}/planner", "daemon MB", (167, 139, 250)),
     (f"{entities.MEMORY}/recorder", "recorder MB", (156, 163, 175)),
-    (entities.PROCESSOR, "planner %", (245, 140, 40)),
+    (entities.PROCESSOR, "daemon %", (245, 140, 40)),
     (entities.BATTERY, "battery %", (52, 211, 153)),
 )
 
@@ -76,12 +76,12 @@ class Curves:
             writer.log_static(entity, line)
 
     def draw(self, entity: str, value: float, noise: float = 0.0, spacing_ns: int = 0) -> None:
-        """Draw ``value`` if it differs from the last one drawn.
+        """Draw ``value`` if it differs from the last drawn value.
 
         Args:
             entity: the entity to draw.
             value: the current figure.
-            noise: relative change up to which it is not drawn.
+            noise: relative change up to which the value is not drawn.
             spacing_ns: least time between two drawings [ns].
         """
         now_ns = self._writer.wall_ns
