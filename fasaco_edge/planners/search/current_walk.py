@@ -78,7 +78,7 @@ class CurrentWalk:
 
     @property
     def least_us(self) -> int:
-        """Cost of the best walk, including those in windows [us]."""
+        """Cost of the best walk, in windows or not [us]."""
         if self.windows is None or not self._in_windows:
             return self.best_us
         return min(self.best_us, self.windows.best_us)
