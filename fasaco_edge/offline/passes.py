@@ -45,7 +45,7 @@ class PassPlans:
         return f"<PassPlans {name}, {', '.join(self.names)}{swept}, {self.drive.time}>"
 
     def _repr_png_(self) -> bytes:
-        """Return the picture as PNG, as notebooks show it."""
+        """Return the picture as PNG, for notebooks."""
         return png_of(self.plot())
 
     @property

@@ -108,7 +108,7 @@ class Plan:
         return f"<Plan {self.map.name}, {self.path.planner}: {', '.join(words)}>"
 
     def _repr_png_(self) -> bytes:
-        """Return the picture as PNG, as notebooks show it."""
+        """Return the picture as PNG, for notebooks."""
         return png_of(self.plot())
 
     @property
