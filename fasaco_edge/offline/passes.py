@@ -60,7 +60,7 @@ class PassPlans:
 
     @property
     def cost_s(self) -> float:
-        """Time to drive and turn along all walks' cells [s]; of the lines: ``drive.seconds``."""
+        """Time to drive and turn along all walks' cells [s]; the lines have ``drive.seconds``."""
         return math.fsum(plan.cost_s for plan in self.plans)
 
     @property

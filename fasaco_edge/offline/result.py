@@ -140,12 +140,12 @@ class Plan:
 
     @property
     def cost_s(self) -> float:
-        """Time to drive and turn along the walk's cells [s]; of the line: ``drive.seconds``."""
+        """Time to drive and turn along the walk's cells [s]; the line has ``drive.seconds``."""
         return self.path.cost_s
 
     @property
     def gap(self) -> float | None:
-        """Optimality gap of ``cost_s``, as a share; None if unknown. Of the line: ``drive.gap``."""
+        """Optimality gap of ``cost_s``, as a share; None if unknown. The line has ``drive.gap``."""
         return self.path.gap
 
     @cached_property

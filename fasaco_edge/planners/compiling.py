@@ -6,8 +6,8 @@ the folder; once it has grown, it records the compiled stages and continues as a
 Kernels that are damaged, or that other users could have written, count as missing.
 
 In parallel, a second compiler compiles the stages that share few kernels with the others. It writes
-to its own folder, as two writers would damage numba's index of a function. When it has ended, the
-first compiler moves the files of functions that it lacks, and compiles the rest.
+to its own folder, as two writers would damage numba's index of a function. After its end the
+first compiler takes over the files of functions that it lacks, and compiles the rest.
 """
 
 from __future__ import annotations
@@ -281,7 +281,7 @@ class SecondCompiler:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def hand_over(self) -> None:
-        """Wait for its end, and move the files of functions that only it has compiled.
+        """Wait for the second compiler, and move the files of functions that only it has compiled.
 
         If it failed, nothing is moved, and the first compiler compiles all functions.
 

@@ -65,7 +65,7 @@ class Curve:
         is_backward: bool (n - 1,): whether each segment is driven backward.
         legs: int64 (n,): for a pose on a straight of the line, the index of the line's point before
             it; below 0 for poses beside the line.
-        spots: number of turns that do not fit, and stay on the spot.
+        spots: number of turns that no arcs can replace: they stay turns on the spot.
     """
 
     poses: Floats

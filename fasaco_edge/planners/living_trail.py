@@ -5,8 +5,8 @@ to the next ants. The equations are those of Carr and Wang 2022:
 
 * equation (7), local update: applied by each ant (``kernels.ants``) and at each change of the map.
   Driving a step also halves its pheromone;
-* equation (8), global update: ants apply it along what they rebuilt, and each published plan along
-  its path; the other steps at the path's cells fade by (7).
+* equation (8), global update: ants apply it along discs that they rebuilt, each published plan
+  along its path; the other steps at the path's cells fade by (7).
 
 Delta phi = (distinct cells x step cost) / path cost, about 1 at best, as in
 ``planners.paper.fasaco``; a step that a path takes twice is strengthened once.

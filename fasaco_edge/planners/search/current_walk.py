@@ -1,7 +1,7 @@
 """Current walk of a search, and its best walk so far.
 
 A search changes parts of the walk: a region of the ground that is loaded and put back
-(``walk_region``), or windows (``windows``). The results are accepted here. Walks are framed cells.
+(``walk_region``), or windows (``windows``). This module accepts results. Walks are framed cells.
 """
 
 from __future__ import annotations
