@@ -401,7 +401,6 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("--speed-m-s -1", "--speed-m-s: expected a number above 0, got -1.0"),
         ("--turn-s -1", "--turn-s: expected a number of at least 0, got -1.0"),
         *((f"--clearance={m}", "--clearance: expected a number") for m in ("1.1", "-0.1", "nan")),
         *((f"--overlap={m}", "--overlap: expected a number") for m in ("0.9", "-0.1", "nan")),
