@@ -244,14 +244,6 @@ def test_an_end_is_named_as_a_start_is(plan, tmp_path, capsys):
     assert "end cell (0, 30)" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("align", ["wall", "nan", "361", "1,2"])
-def test_cells_lie_along_walls_or_axes_or_at_an_angle(capsys, align):
-    with pytest.raises(SystemExit) as ended:
-        main(["plan", "office", "--line", "quick", f"--align={align}"])
-    assert ended.value.code == 2
-    assert "must be walls, axes or an angle" in capsys.readouterr().err
-
-
 def test_a_map_gets_a_floor_line_unless_a_paper_planner_runs(plan, grid_file):
     lines = {
         words: plan(*words)[0]["line"]

@@ -152,3 +152,22 @@ def test_the_command_tells_the_same_twice(recording, capsys, terminal_width):
     assert paths[0]["reason"].split()[0] in table
     # By time alone, see above.
     assert re.search(rf"\d+ of {summary['coverable_cells']} cells", table)
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (None, "No such file or directory"),
+        ("hello", "this is no recording"),
+        ("RRF2 and then nothing", "holds no samples"),
+    ],
+)
+def test_a_file_that_is_no_recording_is_named(tmp_path, capsys, content, told):
+    path = tmp_path / "a.rrd"
+    if content is not None:
+        path.write_text(content)
+    assert main(["replay", str(path)]) == 1
+    err = capsys.readouterr().err
+    assert f"fasaco-edge: {path}: " in err
+    assert told in err
+    assert "hint: " in err
