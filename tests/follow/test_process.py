@@ -9,7 +9,7 @@ import yaml
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.cli import _parser, main
+from fasaco_edge.cli import _parser
 from fasaco_edge.cli.follow import settings_of
 from fasaco_edge.follow.estimate import VelocityCommand
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
@@ -179,24 +179,6 @@ def test_a_robot_whose_localiser_or_odometry_is_silent_stands(base, tmp_path, si
 
 def velocity(sample):
     return decode_velocity(sample.payload, schemas.TWIST_STAMPED)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--pose-age", "nan"], "must be in (0.05, 10] s"),
-        (["--speed", "0"], "--speed must be above 0"),
-        (["--config", "/nowhere.yaml"], "/nowhere.yaml"),
-        (["--robot", "a/b"], "must be chunks of letters"),
-    ],
-)
-def test_mistakes_are_named(words, said, capsys):
-    try:
-        code = main(["follow", *words])
-    except SystemExit as ended:
-        code = ended.code
-    assert code in (2, 78)
-    assert said in capsys.readouterr().err
 
 
 def test_it_takes_scans_and_compares_them_with_the_map(base, tmp_path):

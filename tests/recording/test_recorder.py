@@ -52,6 +52,7 @@ from tests.support.scripted_mission import (
     building,
 )
 from tests.support.senders import Sender
+from tests.wire.schemas import check
 
 ERRORS = {"total": 2, "last": "", "by_code": {"malformed_message": 2, "no code": 3}}
 FRAMES = 40
@@ -247,6 +248,7 @@ def test_the_card_says_how_it_ended_from_then_on_only(recorded):
 
 def test_a_malformed_sample_affects_no_other(recorded):
     report = recorded.report
+    check("recorder.json", report)
     assert (report["malformed"], report["lost"], report["state"]) == (1, 0, "recording")
     assert 0 < report["rss_mb"] < 400
     lines = read_column(recorded.path, entities.BUS_LOG, "TextLog:text").values
