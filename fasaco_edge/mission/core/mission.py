@@ -33,7 +33,6 @@ from fasaco_edge.mission.events import (
     PathUpdate,
     PoseReceived,
     PriorityReceived,
-    State,
 )
 from fasaco_edge.mission.map.placing import restored
 from fasaco_edge.mission.rooms.room_book import RoomBook
@@ -41,6 +40,7 @@ from fasaco_edge.mission.rooms.room_watch import RoomWatch
 from fasaco_edge.mission.work.idle_places import IdlePlaces
 from fasaco_edge.mission.work.order_state import OrderState, Stage
 from fasaco_edge.planners.living_trail import LivingTrail
+from fasaco_edge.states import State
 
 __all__ = ["Mission", "MissionConfig"]
 
