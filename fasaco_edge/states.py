@@ -107,16 +107,19 @@ class State(StrEnum):
 
 
 _ROWS = {state.value: state.row for state in State}
-_UNKNOWN = Row(Activity.NONE, "grey")
-TROUBLES = frozenset(state for state in State if state.row.is_trouble)
-"""States in which people have to help."""
 
 
 def row_of(name: str) -> Row:
     """Return the properties of a state by its name; those of no activity for an unknown one."""
-    return _ROWS.get(name, _UNKNOWN)
+    return _ROWS.get(name, Row(Activity.NONE, "grey"))
 
 
 def states_of(least: Activity, most: Activity = Activity.COVERING) -> frozenset[State]:
     """Return the states with activities from ``least`` to ``most``."""
     return frozenset(state for state in State if least <= state.row.activity <= most)
+
+
+TROUBLES = frozenset(state for state in State if state.row.is_trouble)
+"""States in which people have to help."""
+AT_WORK = states_of(Activity.COVERING)
+"""States in which the robot covers floor, or soon will."""

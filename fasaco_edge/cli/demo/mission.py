@@ -24,7 +24,7 @@ from fasaco_edge.cli.demo.view import demo_view
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.addresses import free_port
 from fasaco_edge.host.processes import python_program
-from fasaco_edge.states import Activity, states_of
+from fasaco_edge.states import AT_WORK
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import Status
@@ -36,7 +36,6 @@ RECORDERS_WITHIN_S = 60.0
 SETTLE_SIM_S = 3.0
 # Programs that end after the robots, as they record them, by the names of their logs.
 LAST = ("daemon", "fleet")
-AT_WORK = states_of(Activity.COVERING)
 
 
 @dataclass(frozen=True, slots=True)

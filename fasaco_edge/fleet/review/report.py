@@ -32,9 +32,8 @@ from fasaco_edge.fleet.observer.cells import (
 from fasaco_edge.fleet.recording.notes import Note, read_notes
 from fasaco_edge.fleet.review.tracks import RobotTrack, seat_of, seconds_of, tracks_of
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.states import Activity, states_of
+from fasaco_edge.states import AT_WORK
 
-AT_WORK = states_of(Activity.COVERING)
 # Time over which the highest rate of messages is averaged [s].
 PEAK_S = 5.0
 # Notes come once a second: a longer interval means that no message arrived [s].

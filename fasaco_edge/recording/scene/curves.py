@@ -141,8 +141,7 @@ class Curves:
     def __init__(self, writer: RecordingWriter) -> None:
         self._writer = writer
         self._drawn: dict[str, _Drawn] = {}
-        # Of each sum its value, of each rate time [s] and figure at the beginning of its period.
-        self._sums: dict[str, float] = {}
+        # Of each rate, time [s] and figure at the beginning of its period.
         self._since: dict[str, tuple[float, float]] = {}
         for curve in CURVES:
             if curve.plot is not None:
@@ -158,20 +157,13 @@ class Curves:
             value = curve.of(message)
             if value is not None and curve.over is not None:
                 value = self._rate(curve.entity, value, curve.over(message))
-            if value is not None and curve.is_sum:
-                value = self._sums[curve.entity] = self._sums.get(curve.entity, 0.0) + value
             if value is not None:
+                drawn = self._drawn.get(curve.entity) if curve.is_sum else None
+                value += drawn.last if drawn else 0.0
                 self.draw(curve.entity, value, curve.noise, curve.spacing_ns)
 
     def draw(self, entity: str, value: float, noise: float = 0.0, spacing_ns: int = 0) -> None:
-        """Draw ``value`` if it differs from the last one drawn.
-
-        Args:
-            entity: the entity to draw.
-            value: the current figure.
-            noise: relative change up to which it is not drawn.
-            spacing_ns: least time between two drawings [ns].
-        """
+        """Draw ``value`` if it differs from the last one drawn; see ``Curve`` for the others."""
         now_ns = self._writer.wall_ns
         curve = self._drawn.get(entity)
         if curve is None:
