@@ -34,7 +34,7 @@ class Row:
         activity: what the robot does.
         colour: colour of the state, of which each output has its own shade.
         level: its level of ROS diagnostics: 0 OK, 1 WARN, 2 ERROR.
-        is_trouble: whether people have to help.
+        needs_help: whether people have to help.
         word: one word for the owner of the robot; "" if the state's own name is plain.
         does: what the robot does, for its owner; "" if that depends on more than the state.
     """
@@ -42,7 +42,7 @@ class Row:
     activity: Activity
     colour: Colour
     level: int = 0
-    is_trouble: bool = False
+    needs_help: bool = False
     word: str = ""
     does: str = ""
 
@@ -119,7 +119,7 @@ def states_of(least: Activity, most: Activity = Activity.COVERING) -> frozenset[
     return frozenset(state for state in State if least <= state.row.activity <= most)
 
 
-TROUBLES = frozenset(state for state in State if state.row.is_trouble)
+TROUBLED = frozenset(state for state in State if state.row.needs_help)
 """States in which people have to help."""
 AT_WORK = states_of(Activity.COVERING)
 """States in which the robot covers floor, or soon will."""

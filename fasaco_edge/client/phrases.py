@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from fasaco_edge import states
+from fasaco_edge.states import TROUBLED
 from fasaco_edge.text import one_line, percent
 from fasaco_edge.wire.documents.replies import (
     TROUBLES,
@@ -163,9 +163,9 @@ def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
     """Return the changes of a status, as (text, tone)."""
     found: list[tuple[str, str]] = []
     if before is None or before.state != after.state:
-        tone = BAD if after.state in states.TROUBLES else GOOD if after.state == "done" else PLAIN
+        tone = BAD if after.state in TROUBLED else GOOD if after.state == "done" else PLAIN
         found.append((f"{after.state}: {after.reason}", tone))
-    elif after.state in states.TROUBLES and before.reason != after.reason:
+    elif after.state in TROUBLED and before.reason != after.reason:
         found.append((f"{after.state}: {after.reason}", BAD))
     found += trouble_changes(before, after)
     known = before.errors.by_code if before is not None else {}

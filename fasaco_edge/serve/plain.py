@@ -117,7 +117,7 @@ def does(status: Status) -> str:
 def look(status: Status) -> str:
     """Return the class of the state in the page's style sheet: bad, wait, go or ""."""
     row = row_of(status.state)
-    if status.troubles or row.is_trouble:
+    if status.troubles or row.needs_help:
         return "bad"
     return {"grey": "", "amber": "wait"}.get(row.colour, "go")
 

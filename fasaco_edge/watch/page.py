@@ -13,7 +13,7 @@ from fasaco_edge.client import phrases
 from fasaco_edge.client.feed import Feed
 from fasaco_edge.client.phrases import age, clock
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.states import TROUBLES
+from fasaco_edge.states import TROUBLED
 from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.glyphs import FAINT, ScreenBlocks, with_keys
@@ -149,7 +149,7 @@ def headline(view: RobotView, now: float, width: int) -> Text:
         line.append(f"silent for {age(silent)}", "bold red")
     else:
         line.append(one_line(status.state).upper(), f"bold {state_colour(status.state)}")
-        if status.troubles and status.state not in TROUBLES:
+        if status.troubles and status.state not in TROUBLED:
             line.append("  IN TROUBLE", "bold red")
         if status.coverage is not None:
             line.append(f"  {percent(status.coverage.fraction)} of cells")

@@ -13,7 +13,7 @@ from fasaco_edge.errors import FasacoError
 from fasaco_edge.fleet.observer.observed import JOINED, MOST_MEMBERS, ObservedFleet, ObservedRobot
 from fasaco_edge.fleet.observer.queues import RobotSample
 from fasaco_edge.fleet.observer.survey import Survey, survey_of
-from fasaco_edge.states import TROUBLES, Activity, states_of
+from fasaco_edge.states import TROUBLED, Activity, states_of
 from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
 from fasaco_edge.wire.documents.json_text import decode_tolerant
@@ -265,7 +265,7 @@ class FleetView:
             self.events.add(now, f"{name} is gone: no messages from it", BAD)
             return
         name += {"": " joined", "gone": " is back"}.get(before, "")
-        is_troubled = not robot.waits_for and robot.state in TROUBLES
+        is_troubled = not robot.waits_for and robot.state in TROUBLED
         why = f": {short(plain(status.reason))}" if is_troubled and status is not None else ""
         is_good = doing == "done" or before in ("", "gone")
         tone = BAD if is_troubled else GOOD if is_good else PLAIN
