@@ -62,7 +62,7 @@ It stops the robot within 0.2 s, and keeps it standing, while
   no daemon plans for it, or the daemon that plans has sent no status for 2.5 s
   another follower drives this robot: this follower then sends nothing, and takes over once the
     other is gone
-  access rules hide from other followers that this one drives
+  access rules hide this follower from other followers
 and when this program ends. The robot drives on by itself once the reason is gone. After the third
 try it drives on once the pose has moved by 0.1 m, or the path leads elsewhere (by 45 degrees or
 more). A pose with the stamp of the previous pose does not count as new.
@@ -188,7 +188,7 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
 
 
 def _pace(args: argparse.Namespace, robot: RobotConfig) -> float:
-    """Return the seconds of the robot per second, as ``simulate`` has them."""
+    """Return the simulated seconds per second."""
     pace = robot.time_scale if args.speed is None else args.speed
     if not 0.0 < pace <= MOST_PACE:
         where = "robot.time_scale" if args.speed is None else "--speed"

@@ -52,7 +52,7 @@ class MapConfig(StrictDocument, frozen=True):
 
 
 class PoseConfig(StrictDocument, frozen=True):
-    """The type of poses in samples that name none, as under ROS 2."""
+    """The type of poses in samples that name no type, as under ROS 2."""
 
     schema: Literal[
         "geometry_msgs/msg/PoseStamped",
@@ -119,7 +119,8 @@ class PlannerConfig(StrictDocument, frozen=True):
 class MissionPolicyConfig(StrictDocument, MissionPolicy, frozen=True, kw_only=True):
     """The mission's policy, and the folder of its progress.
 
-    If ``state_dir`` is "", the folder is the state folder of the service or, without one, the user.
+    If ``state_dir`` is "", it is the state folder of the service or, without a service, of the
+    user.
     """
 
     state_dir: str = ""
@@ -257,8 +258,8 @@ class MetricsConfig(StrictDocument, frozen=True):
         """Return the address; None for none.
 
         Raises:
-            BadConfiguration: it is no address with a port, or other computers can reach it although
-                ``open_to_everyone`` is not set.
+            BadConfiguration: ``listen`` is not an address with a port, or other computers can reach
+                it and ``open_to_everyone`` is not set.
         """
         if not self.listen:
             return None
@@ -312,7 +313,7 @@ class DaemonConfig(StrictDocument, frozen=True):
 
     @property
     def lattice_deg(self) -> float | None:
-        """The angle of the cells' rows to the x axis of the map frame [deg]; None for the walls.
+        """The angle of the cells' rows to the x axis of the map frame [deg]; None: along the walls.
 
         Cells are aligned with the axes if walks lead through cell centres. In a fleet the axes
         take the place of the walls, as each robot would see other walls first.

@@ -9,7 +9,7 @@ from __future__ import annotations
 # A simulation's time advances at most this far without a pose [s], as poses come ten times a
 # second.
 LEAD_S = 0.09
-# After this real time without a pose [s], the simulation has stopped, and time goes on.
+# After this real time without a pose [s], the simulation counts as stopped, and time goes on.
 SILENT_S = 2.0
 # Stamps that jump back, or forward by more than this, come from another simulation [s].
 JUMP_S = 5.0

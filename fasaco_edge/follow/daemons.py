@@ -1,14 +1,14 @@
 """Partners of a follower: the daemons of its robot, and the other followers of its base.
 
-Only samples of the daemon that plans count. Another daemon, which waits or restarts in a loop, does
-not prove by its status that the planner runs, and its path is not driven. Samples of one daemon may
-arrive in any order, for instance a path before the token of its claim, so the newest of each kind
-are kept.
+Only samples of the daemon that plans count. The status of another daemon, which waits or restarts
+in a loop, does not prove that the planner runs, and its path is not driven. Samples of one daemon
+may arrive in any order, for instance a path before the token of its claim, so the newest sample of
+each kind is kept.
 
-Of several followers of one robot, one drives. Each shows a token ``driver/<its Zenoh id>/<waits,
-yields or drives>``. A follower that waits sends no commands, not even zeros. A session sees its own
-token even where access rules hide it from others. So a second session must see the token before the
-follower sends its first command.
+Of several followers of one robot, one drives. Each follower shows a token ``driver/<its Zenoh
+id>/<waits, yields or drives>``. A follower that waits sends no commands, not even zeros. A session
+sees its own token even where access rules hide it from others. So a second session must see the
+token before the follower sends its first command.
 """
 
 from __future__ import annotations
@@ -33,10 +33,9 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_JSON_INTEGER
 
-# Largest number of daemons whose samples are kept; further ones displace the oldest.
+# Largest number of daemons whose samples are kept; further daemons displace the oldest.
 MOST_DAEMONS = 16
-# Largest number of claims kept; further ones are ignored. They do not displace older claims, which
-# would not arrive again.
+# Largest number of claims kept; further claims are ignored, as older claims would not arrive again.
 MOST_CLAIMS = 1_000
 
 PLANS = "plans"
@@ -95,7 +94,7 @@ class Daemons:
             self._daemon(own).status_at = now
 
     def take_path(self, sample: Sample) -> None:
-        """Take in a path; one that does not name its daemon is ignored."""
+        """Take in a path; a path that does not name its daemon is ignored."""
         attachment = _object(sample.attachment)
         own, revision = attachment.get("daemon"), attachment.get("revision")
         if not _is_id(own):
@@ -107,7 +106,7 @@ class Daemons:
             daemon.speed_m_s = speed if _is_speed(speed) else math.inf
 
     def news(self) -> News:
-        """Return the newest samples of the daemon that plans; each status and path once."""
+        """Return the newest samples of the daemon that plans; each status and path only once."""
         with self._lock:
             kept = self._daemons.get(self._planner) or News(self._planner)
             news = replace(kept)
@@ -163,7 +162,7 @@ NO_RIGHT = "access rules keep its token from others: the role driver needs `driv
 class BaseClaim(BusClaim):
     """The claim of this follower."""
 
-    # Time within which another follower that drives sees this token; this one must not drive
+    # Time within which another follower that drives sees this token; this follower must not drive
     # before.
     rejoin_s = ASK_PERIOD_S + 2.0 * SETTLE_S
 

@@ -76,7 +76,7 @@ STAND = VelocityCommand()
 
 
 class PoseEstimate:
-    """Poses and commands in, the robot's pose at any time out.
+    """Estimates the robot's pose at any time from poses and commands.
 
     Args:
         limits: limits of the base, which follows commands as fast as these allow.
@@ -85,8 +85,8 @@ class PoseEstimate:
         jump: distance [m] and angle [rad] of the newest pose from the expected one; None if it is
             accepted.
         measured: the newest accepted pose, unfiltered.
-        commanded: the sum of all commands up to the time of ``measured``: x, y [m] in the measured
-            headings, and turn [rad].
+        commanded: the motion by all commands up to the time of ``measured``: x, y [m] along the
+            measured headings, and turn [rad].
         delay: time from a command to the arrival of a pose that shows its effect [s].
     """
 

@@ -1,6 +1,6 @@
 """Follower of a base that takes velocities: paths, poses and heartbeats in, command and state out.
 
-No clock, no session: the caller passes the monotonic time.
+It has no clock and no session: the caller passes the monotonic time.
 """
 
 from __future__ import annotations

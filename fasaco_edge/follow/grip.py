@@ -1,7 +1,7 @@
 """Check that the base moves as commanded: a base that pushes against an obstacle must stop.
 
 Poses are noisy, so all poses of an interval are fitted to the commanded motion. The fitted share of
-that motion is about 1 for a robot that moves and 0 for one that does not, however it drives and
+that motion is about 1 for a robot that moves and 0 for a robot that does not, whether it drives or
 turns. Noise raises the share as often as it lowers it: if noise hides all motion, every second
 interval ends in a pause.
 
@@ -20,12 +20,12 @@ from fasaco_edge.grid.geometry import Pose2D
 
 # Poses are averaged over this time [s].
 MEAN_S = 1.0
-# The robot was moved if an average is this far [m] from the one this many averages earlier; slower
-# motion is drift of the poses.
+# The robot was moved if an average pose is MOVED_M [m] or more from the average pose MEANS averages
+# earlier; slower motion is drift of the poses.
 MOVED_M, MEANS = 0.1, 5
-# Noise adds to that distance: this many times the median step from one average to the next. Number
-# of last steps for the median, and least number. The few steps of a moved robot hardly change it.
-# Normally distributed noise moves only one average in 2^16 that far.
+# Noise adds SCATTERS times the median step from one average to the next to that distance. Number of
+# last steps in the median, and least number. The few steps of a moved robot hardly change the
+# median. Normally distributed noise moves only one average in 2^16 that far.
 SCATTERS, STEPS, LEAST_STEPS = 4.0, 30, 6
 
 # Position and turn, as lengths [m].
@@ -72,8 +72,8 @@ class Rest:
 # poses.
 LEAST_WAY_M, LEAST_SHARE, WAY_M_RAD = 0.2, 0.15, 0.2
 INTERVAL_S, LEAST_POSES = 2.0, 3
-# Pause after the first try [s], doubled after the next, and number of tries in a direction. After
-# the last try the robot waits until it is moved, or the path leads elsewhere.
+# Pause after the first try [s], doubled after each further try; number of tries in a direction.
+# After the last try the robot waits until it is moved, or the path leads elsewhere.
 REST_S = 2.0
 TRIES = 3
 

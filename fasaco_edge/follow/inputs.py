@@ -1,4 +1,4 @@
-"""Inputs of a follower by cycle: poses, paths and heartbeats of the daemon, scans and maps."""
+"""Inputs of a follower in each cycle: poses, paths and heartbeats of the daemon, scans and maps."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
 
 LOG = logging.getLogger(__name__)
-# Largest number of poses that wait for the next cycle; further ones displace the oldest.
+# Largest number of poses that wait for the next cycle; further poses displace the oldest.
 MOST_POSES = 256
 
 
 class WatchedPublisher(OnePublisher):
-    """The publisher of an input that is listened to; a conflict with another one is logged."""
+    """Selects one publisher of an input, and logs a conflict of two publishers."""
 
     _logged = ""
 
@@ -43,7 +43,7 @@ class WatchedPublisher(OnePublisher):
 
 
 class Inputs:
-    """Subscribes, and passes the inputs since the last cycle to a follower."""
+    """Subscribes to inputs, and passes those since the last cycle to a follower."""
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
         # What the planning daemon sent since the last cycle.
@@ -65,7 +65,7 @@ class Inputs:
         return self.time_of(time.monotonic())
 
     def time_of(self, came_at: float) -> float:
-        """Return the robot's time of an arrival, given by the computer's monotonic clock [s]."""
+        """Return the robot's time at a time of the computer's monotonic clock [s]."""
         return self._clock.at(came_at)
 
     def feed(self, follower: Supervision) -> None:
@@ -108,10 +108,10 @@ class Inputs:
         self._daemons.take_status(sample.payload, self.now())
 
 
-# Largest numbers of waiting scans, and of waiting messages of maps; further ones displace the
+# Largest numbers of waiting scans, and of waiting messages of maps; further messages displace the
 # oldest.
 MOST_SCANS, MOST_UPDATES = 2, 256
-# Largest size of a scan: a range and an intensity for each beam, and the rest.
+# Largest size of a scan: a range and an intensity for each beam, and the other members.
 MOST_SCAN_BYTES = 8 * MAX_SCAN_BEAMS + 1024
 # Largest size of a map, without its pixels of one byte each.
 HEADER_BYTES = 1024
@@ -119,7 +119,7 @@ MAP, UPDATE, SCAN = topics.MAP.name, topics.MAP_UPDATE.name, topics.SCAN.name
 
 
 class ScanInputs:
-    """Subscribes to scans and maps, and passes on those since the last cycle."""
+    """Subscribes to scans and maps, and passes on the messages since the last cycle."""
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
         scan = settings.scan
@@ -160,6 +160,5 @@ class ScanInputs:
         if sample.size > self._most_map_bytes:
             return
         if not is_update:
-            # A new map replaces all earlier ones.
             self._maps.clear()
         self._maps.append((is_update, sample.payload))

@@ -1,4 +1,4 @@
-"""Legs of a path: straight parts, and the speed at which a robot can turn from each to the next.
+"""Legs of a path: straight parts, and the speed at which a robot can turn from one to the next.
 
 While driving, the robot turns as fast as on the spot, and begins early enough to have done half of
 the turn when it passes the corner. The turn takes the same time at any speed, so the distance from
@@ -23,7 +23,7 @@ SAME_DIRECTION = math.cos(0.1)
 ROUNDED_M = 0.02
 # At sharper corners the robot turns on the spot [rad].
 SHARP_RAD = math.radians(135.0)
-# Time steps of half a turn.
+# Number of time steps for half a turn.
 STEPS = 32
 
 
@@ -81,7 +81,7 @@ class Leg:
 
 
 def apart(poses: Iterable[Pose2D], least: float) -> Iterator[Pose2D]:
-    """Yield the poses that are at least ``least`` [m] from the one yielded before."""
+    """Yield the poses that are at least ``least`` [m] from the last yielded pose."""
     last = None
     for pose in poses:
         if last is None or math.hypot(pose.x - last.x, pose.y - last.y) >= least:

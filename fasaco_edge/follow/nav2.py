@@ -1,12 +1,11 @@
 """Nav2's controller as follower: paths, poses, heartbeats and replies in, requests out.
 
 A goal is a piece of the path that begins at the robot. The next goal is sent before the robot
-reaches the end of the last one, so that Nav2 switches without a stop. Where the path returns to
-itself, the next piece begins only shortly before that end: a controller continues at the nearest
-part of a path, and would skip the rest of the last goal. The last pose of a goal has the heading of
-the path beyond it, so that the robot turns there until the next goal arrives. A robot that cannot
-turn on the spot gets pieces of a curve, each driven forward or backward as a whole. No clock, no
-session.
+reaches the end of the last goal, so that Nav2 switches without a stop. Where the path returns to
+itself, the next piece begins only shortly before the last goal ends: a controller continues at the
+nearest part of a path, and would skip the rest of the last goal. The last pose of a goal has the
+heading of the path beyond it, so that the robot turns there until the next goal arrives. A robot
+that cannot turn on the spot gets pieces of a curve, each driven forward or backward as a whole.
 """
 
 from __future__ import annotations
@@ -31,20 +30,20 @@ from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.nav2_goals import ABORTED, CANCELED, ERRORS, SUCCEEDED, Ending
 from fasaco_edge.wire.messages.path_points import PathPoints
 
-# The next goal begins at most this far before the end of the last one [m], plus the distance driven
-# in this time [s].
+# The next goal begins at most this far before the end of the last goal [m], plus the distance
+# driven in this time [s].
 AHEAD_M, AHEAD_S = 0.5, 3.0
-# It is sent when the robot is this far from its start [m].
+# The next goal is sent when the robot is this near to the goal's start [m].
 EARLY_M = 0.05
-# Length of a path's beginning, and largest distance of the robot from it for the path to be driven
+# Length of a path's beginning; a robot farther than this from the beginning does not drive the path
 # [m].
 BEGINNING_M = 1.0
 # An unanswered goal counts as accepted once the robot has moved this far on it [m].
 DRIVES_M = 0.15
 # A goal that Nav2 reports as done is not done if the robot is farther than this from its end [m].
 DONE_M = 0.5
-# Pause after an error before the next goal [s], doubled each time up to the maximum until the robot
-# has moved this far [m] or the path leads elsewhere, by its direction this far ahead [m].
+# Pause after an error before the next goal [s]. It doubles each time up to the maximum, until the
+# robot has moved PROGRESS_M [m], or the direction to the path's point LEADS_M ahead [m] changes.
 RETRY_S, MOST_RETRY_S = 1.0, 30.0
 PROGRESS_M, LEADS_M = 0.5, 0.5
 # A robot stands if it has moved less than MOVED_M [m] for STANDS_S, or near the end of its goal for
@@ -52,7 +51,7 @@ PROGRESS_M, LEADS_M = 0.5, 0.5
 # is given up.
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
-# A server that ends a query for a result sooner, without a reply, is gone [s].
+# A server that ends a query for a result within this time, without a reply, is gone [s].
 GONE_S = 290.0
 # Time constant of the filter of the positions that show whether the robot stands [s].
 STEADY_S = 1.0
@@ -126,7 +125,7 @@ class Nav2Follower(Supervision):
         self._steady: Point = (0.0, 0.0)
         self._moved_last: tuple[Point, float] | None = None
         self._path: PathDriven | None = None
-        # The path that replaces the present one, once Nav2 has answered the pending request.
+        # The path that replaces the present path, once Nav2 has answered the pending request.
         self._next: PathByLength | None = None
         # The goal that Nav2 drives, and the goal sent but not answered yet.
         self._active: SentPiece | None = None
@@ -139,7 +138,7 @@ class Nav2Follower(Supervision):
         self._requests: list[Request] = []
 
     def step(self, now: float) -> list[Request]:
-        """Return the requests to Nav2 now."""
+        """Return the requests to send to Nav2 now."""
         if not self._supervised(self._drive, now):
             self._stop()
         if self.state in (FollowerState.STANDS, FollowerState.GIVEN_UP) and self._path:
@@ -158,7 +157,7 @@ class Nav2Follower(Supervision):
             self._fail(FollowerState.NO_NAV2, why, now)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
-        """Take in whether Nav2 accepted a goal; None without an answer: it is cancelled."""
+        """Take in whether Nav2 accepted a goal; None without an answer, which cancels the goal."""
         if self._pending is None or self._pending.id != goal_id:
             return
         goal, self._pending = self._pending, None
@@ -178,7 +177,7 @@ class Nav2Follower(Supervision):
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
-        """Take in how a goal ended; None if that is unknown: it is cancelled."""
+        """Take in how a goal ended; None if that is unknown, which cancels the goal."""
         if self._active is None or self._active.id != goal_id:
             return
         goal, self._active = self._active, None
@@ -213,7 +212,7 @@ class Nav2Follower(Supervision):
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended without a reply: if soon, the server is gone."""
         if waited_s < GONE_S:
-            self.take_ending(goal_id, None, "it went away", now)
+            self.take_ending(goal_id, None, "its server has gone", now)
         elif self._active is not None and self._active.id == goal_id:
             self._requests.append(AskResult(goal_id))
 
@@ -271,7 +270,7 @@ class Nav2Follower(Supervision):
         self._requests.append(SendPiece(goal.id, points, self.path_frame, yaw, is_back))
 
     def _join(self, line: PathByLength, now: float) -> bool:
-        """Switch to a new path if it begins near the robot; return whether it does.
+        """Switch to a new path if it begins near the robot; return whether it begins there.
 
         If the path does not change up to the end of Nav2's goal, Nav2 keeps the goal.
         """
@@ -288,7 +287,7 @@ class Nav2Follower(Supervision):
         assert before is not None
         shift = before.shift_to(line, way, goal)
         if shift is None:
-            # Nav2 switches from its present goal to this one.
+            # Nav2 switches from its present goal to this goal.
             self._send(path, way)
         else:
             goal.start, goal.end = goal.start + shift, goal.end + shift

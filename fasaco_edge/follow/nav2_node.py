@@ -59,8 +59,8 @@ class Cancellations:
     """The goals to cancel: each is requested every second until the server confirms it."""
 
     def __init__(self) -> None:
-        # Time of the last request for each goal [s]; goals whose acceptance is not answered: the
-        # server may not know them yet.
+        # Time of the last request for each goal [s]; goals neither accepted nor refused yet, which
+        # the server may not know.
         self._asked_at: dict[bytes, float] = {}
         self._unanswered: set[bytes] = set()
 
@@ -76,7 +76,7 @@ class Cancellations:
 
     @property
     def are_open(self) -> bool:
-        """Whether the server has yet to confirm any."""
+        """Whether any cancellation is still unconfirmed."""
         return bool(self._asked_at)
 
     def take_sent(self, goal_id: bytes) -> None:

@@ -158,7 +158,7 @@ def run_follower(
 ) -> None:
     """Drive the base along the path until ``stop`` is set; then stop the base.
 
-    In a dry run, ``report`` is called with the text of what would be sent.
+    In a dry run, ``report`` is called with commands or goals as text instead of sending them.
     """
     bus = join(BusSettings("client", settings.connect, secured=settings.secured), stop)
     if bus is None:

@@ -60,7 +60,7 @@ class PathByLength:
         return most
 
     def at(self, way: float) -> Point:
-        """Return the point at an arc length [m]; for values beyond, the beginning or end."""
+        """Return the point at an arc length [m]; outside the path, its beginning or end."""
         self.length(way)
         index = bisect_right(self._ways, way)
         if not 0 < index < len(self._ways):
@@ -123,7 +123,7 @@ class PathByLength:
         return found
 
     def ways(self, start: float, stop: float) -> list[float]:
-        """Return arc lengths between two, up to ``STEP_M`` apart, with each bend [m]."""
+        """Return arc lengths from ``start`` to ``stop``, up to ``STEP_M`` apart, with bends [m]."""
         first, last = bisect_right(self._ways, start), bisect_right(self._ways, stop)
         bends = [way for way in self._ways[first:last] if start < way < stop]
         ways = [start]
@@ -138,8 +138,8 @@ class PathByLength:
 def end_of_piece(line: PathByLength, start: float, near: float) -> float:
     """Return the end of a piece that begins at ``start``, as arc length [m].
 
-    A piece that must end before the line does ends at the last corner, if one is not far before:
-    the robot stops there anyway.
+    A piece that cannot reach the line's end stops at the last corner, if that is near: the robot
+    stops there anyway.
 
     Args:
         line: the path.
@@ -150,7 +150,7 @@ def end_of_piece(line: PathByLength, start: float, near: float) -> float:
     stop = min([stop, *line.reversals(start + LEAST_M, stop)])
     ways = line.ways(start, stop)
     points = [line.at(way) for way in ways]
-    # The poses that are far enough behind along the piece to count, by square of the plane.
+    # Earlier poses that are far enough away along the piece to count, by square of the plane.
     seen: dict[tuple[int, int], list[int]] = {}
     filed = 0
     for index, (way, (x, y)) in enumerate(zip(ways, points, strict=True)):
@@ -169,15 +169,15 @@ def end_of_piece(line: PathByLength, start: float, near: float) -> float:
     return stop
 
 
-# The next goal is sent only if it extends the last one by this much [m].
+# The next goal is sent only if it extends the last goal by this much [m].
 GAIN_M = 0.3
-# Where the path returns to itself, the next goal begins this far before the end of the last one
+# Where the path returns to itself, the next goal begins this far before the end of the last goal
 # [m]: the part skipped there is less than half of a tool.
 TIP_M = 0.1
 # Distances before the end of the last goal at which the next goal may begin, in order of
 # preference, as shares of the largest.
 SHARES = (1.0, 0.6, 0.35, 0.2)
-# The earlier a goal begins before the end of the last one, the farther it must extend beyond that
+# The earlier a goal begins before the end of the last goal, the farther it must extend beyond that
 # end: by the same distance, up to this [m].
 AMPLE_M = 2.0
 # Two paths nearer than this to each other are the same [m].
@@ -195,8 +195,8 @@ class SentPiece:
     id: bytes
     start: float
     end: float
-    # Where the next goal may begin [m]: infinite if it must wait for the end of this one; None if
-    # that is not computed yet.
+    # Where the next goal may begin [m]: infinite if it must wait for the end of this goal; None
+    # until it is computed.
     next_start: float | None = None
 
 
@@ -236,7 +236,7 @@ class PathDriven:
             return math.inf  # the robot has to come to rest there
         for before_m in (*(share * ahead for share in SHARES), TIP_M, 0.0):
             start = max(goal.end - before_m, goal.start)
-            # A goal that begins early also ends early: it must last until the next one arrives.
+            # A goal that begins early also ends early: it must last until the next goal arrives.
             gain_m = max(min(before_m, AMPLE_M), GAIN_M)
             if end_of_piece(self.line, start, near) >= goal.end + gain_m:
                 return start
@@ -262,7 +262,7 @@ class PathDriven:
         return is_last_part and math.dist(here, self.line.at(goal.end)) <= within
 
     def shift_to(self, line: PathByLength, way: float, goal: SentPiece) -> float | None:
-        """Return what to add to arc lengths of a goal for another line [m]; None if the lines
+        """Return the offset of another line's arc lengths from this line's [m]; None if the lines
         differ before the goal ends.
 
         ``way``: the robot's distance along the other line [m].

@@ -36,9 +36,9 @@ Ends = list[tuple[float, float]]
 class Pursuit:
     """Commands along routes, one per cycle.
 
-    On a busy computer a command comes late, and the robot drives on with the last one. The next
-    command then brakes by as much as was possible since the last one. The robot also brakes
-    earlier, by the distance that it would drive on in such a delay.
+    On a busy computer a command comes late, and the robot drives on with the last command. The next
+    command then brakes by as much as was possible since then. The robot also brakes earlier, by the
+    distance that it would drive on in such a delay.
 
     ``period``: time from one command to the next [s].
     """
@@ -48,7 +48,7 @@ class Pursuit:
         self._period = period
         # Whether the robot turns on the spot; and whether it cannot steer to the route.
         self._is_turning, self.is_lost = True, False
-        # Time since the last command, and the expected delay of the next one [s].
+        # Time since the last command, and the expected delay of the next command [s].
         self._seconds, self._late = period, 0.0
         self.last = STAND
 
@@ -67,7 +67,7 @@ class Pursuit:
         return self._is_turning
 
     def brake(self) -> VelocityCommand:
-        """Return the next command on the way to rest."""
+        """Return the next command to brake to rest."""
         self._is_turning, self.last = True, VelocityCommand(self._braked(), self._toward(0.0))
         return self.last
 
@@ -189,7 +189,7 @@ class CurvePursuit(Pursuit):
         return False
 
     def brake(self) -> VelocityCommand:
-        """Return the next command on the way to rest."""
+        """Return the next command to brake to rest."""
         return self._sent(self._braked(), 0.0)
 
     def _along(

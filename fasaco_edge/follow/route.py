@@ -21,14 +21,14 @@ from fasaco_edge.grid.geometry import Point, Pose2D
 # while the path was planned and sent.
 JOIN_WITHIN_M = 0.3
 # Largest distance from a path [m], and angle to it [rad], to join it while driving. Else the robot
-# comes to rest, and drives to the nearest point or to the path's start, if within these [m].
+# comes to rest, and drives to the nearest point or the start, if within NEAREST_M or BEGINNING_M.
 BESIDE_M, ALONG_RAD = 0.02, 0.1
 NEAREST_M, BEGINNING_M = 0.15, 0.6
-# A path continues the last one if it begins on it, between these distances ahead [m].
+# A path continues the last path if it begins on that path, between these distances ahead [m].
 LEAST_LEAD_M, LEAD_M = 0.15, 2.0
-# Distance beyond a corner, or beyond the place where a turn begins, at which it is missed [m].
+# Distance at which the robot has missed a corner, or the place where a turn begins [m].
 MISSED_M = 0.03
-# A corner of the new path is the same as one of the old path if they are this near [m].
+# A corner of the new path this near to a corner of the old path is the same corner [m].
 SAME_M = 1e-3
 # Legs of a curve up to this long are chords of an arc [m].
 CHORD_M = 0.06
@@ -49,7 +49,7 @@ class LegRoute:
         # Greatest speed in the corner that the robot rounds to its leg [m/s]; 0 without a corner.
         self.rounds = 0.0
         self._limits = limits
-        # Legs read so far, from the one that the robot is on; legs still to be read.
+        # Legs read so far, from the leg that the robot is on; legs still to be read.
         self._legs: list[Leg] = []
         self._coming = self._legs_along(poses)
         # Distance by which the robot missed the corner that it returns to [m]; infinity if it does
@@ -65,9 +65,9 @@ class LegRoute:
         """Go on to the next leg.
 
         A robot at rest at ``here`` that has missed the corner returns to it first: the straight
-        line to the next leg may cross a wall. It returns again only if that brought it nearer.
-        Otherwise, a robot with late poses, or poses of another point than it turns about, would
-        circle about the corner endlessly.
+        line to the next leg may cross a wall. It returns again only if the last return brought it
+        nearer. Otherwise a robot with late poses, or poses of a point that is not its centre of
+        rotation, would circle about the corner endlessly.
         """
         self._leg(1)
         corner = self._legs[0].end if self._legs else None
@@ -88,7 +88,7 @@ class LegRoute:
     def round_corner(self, here: Point, speed: float) -> None:
         """Go on to the next leg if the robot, at this speed [m/s], has to begin the turn to it.
 
-        A robot that has missed that place comes to rest at the corner instead.
+        A robot past the place where the turn begins comes to rest at the corner instead.
         """
         leg = self.leg
         if leg is None or leg.stops or leg.bends:
@@ -102,7 +102,7 @@ class LegRoute:
 
     def ends(self, along: float, horizon: float) -> list[tuple[float, float]]:
         """Return the places ahead that limit the speed: distance from ``along`` [m], and greatest
-        speed there [m/s]. The last is the next stop, or the first place beyond ``horizon`` [m]."""
+        speed there [m/s]. The last one is the next stop, or the first place beyond ``horizon``."""
         found: list[tuple[float, float]] = []
         left = -along
         for leg in self._ahead():
@@ -134,9 +134,9 @@ class LegRoute:
     def join(self, here: Point, heading: float | None, before: LegRoute | None) -> JoinOutcome:
         """Join this new path at its beginning: find the robot's leg.
 
-        If the path has the corner that the robot was driving to, this is the leg to that corner: on
-        the same leg the robot just goes on. If the path begins farther along the last one, the
-        robot drives along the last one up to there.
+        If the path has the corner that the robot was driving to, the robot's leg is the leg to that
+        corner. If the path begins farther along the last path, the robot first drives along the
+        last path to the new one's start.
 
         Args:
             here: the robot's position.
@@ -185,7 +185,7 @@ class LegRoute:
             if math.dist(leg.end, target) <= SAME_M:
                 return index, True
             way += leg.length
-        # Else it is the leg where the distance to the robot stops decreasing.
+        # Else the robot is on the leg where the distance to the robot stops decreasing.
         way, index = 0.0, 0
         while (one := self._leg(index)) and (after := self._leg(index + 1)):
             way += one.length
@@ -196,7 +196,7 @@ class LegRoute:
         return index, False
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
-        """Return the legs up to a point soon ahead; none if it or the robot is off them."""
+        """Return the legs up to a point soon ahead; none if point or robot is off the legs."""
         way = 0.0
         for index, leg in enumerate(self._ahead()):
             if index == 0:
@@ -225,7 +225,7 @@ class LegRoute:
         raise AssertionError("the last leg does not bend")
 
     def _ahead(self) -> Iterator[Leg]:
-        """Yield the legs, from the one that the robot is on."""
+        """Yield the legs, from the leg that the robot is on."""
         index = 0
         while (leg := self._leg(index)) is not None:
             yield leg
@@ -266,7 +266,7 @@ class CurveRoute(LegRoute):
 
     def __init__(self, poses: Iterable[Pose2D], limits: BaseLimits) -> None:
         super().__init__(poses, limits)
-        # The leg before the first one, unless the robot comes to rest between them.
+        # The leg before the first leg, unless the robot comes to rest between them.
         self._behind: Leg | None = None
 
     def next_leg(self, here: Point | None = None) -> None:

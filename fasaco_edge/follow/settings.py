@@ -13,7 +13,7 @@ from fasaco_edge.wire.schemas import TWIST
 
 @dataclass(frozen=True, slots=True)
 class PoseSource:
-    """A key of poses.
+    """A key on which poses are received.
 
     Attributes:
         key: key expression to subscribe to.
@@ -76,7 +76,7 @@ class FollowSettings:
     dry_run: bool = False
 
     def encode(self) -> bytes:
-        """Return it as JSON."""
+        """Return the settings as JSON."""
         return json.dumps(asdict(self)).encode()
 
     @classmethod

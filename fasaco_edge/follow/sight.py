@@ -1,11 +1,11 @@
 """Sight: obstacles that the lidar sees and the map does not show, and the speed that they allow.
 
-Beams become points in the robot's frame: x ahead, y to the left of its centre [m]. Without numpy.
+Beams become points in the robot's frame: x ahead, y to the left of its centre [m].
 
-Standing things that the map shows are ignored: the path keeps clear of them, by as little as a
-centimetre along walls, which is less than the noise of ranges. Things that may move count even
-there, as people leave marks on a map where they walked. The robot keeps a margin from all things
-that count. A thing is standing once it has been in its place for a while; any other may move.
+Standing things that the map shows are ignored: the path keeps clear of them, along walls by as
+little as a centimetre, less than the noise of ranges. Things that may move count even where the map
+shows something, as people leave marks on a map where they walked. The robot keeps a margin from all
+things that count. A thing is standing once it has been in its place for a while.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from fasaco_edge.grid.motion import stopping_rate
 from fasaco_edge.wire.messages.base import LaserScan, decode_scan
 from fasaco_edge.wire.messages.grids import GridOctets, read_grid, with_update
 
-# Largest distance of points from the sensor; others are ignored [m].
+# Points farther than this from the sensor are ignored [m].
 REACH_M = 3.0
 # Number of sectors; in each only the shortest beam counts.
 SECTORS = 360
-# Least share of valid beams; with fewer the sensor is covered or broken.
+# Least share of valid beams; with fewer valid beams, the sensor is covered or broken.
 LEAST_SHARE = 0.1
 
 
@@ -37,7 +37,7 @@ class Mount:
     """Pose of the lidar on the robot.
 
     Attributes:
-        x, y: ahead of the robot's centre, and to its left [m].
+        x, y: distances ahead of the robot's centre, and to its left [m].
         yaw: direction of the lidar's angle 0, counter-clockwise from ahead [rad].
         upside_down: whether its angles grow clockwise.
     """
@@ -78,13 +78,12 @@ def points_of(scan: LaserScan, mount: Mount) -> list[Point] | None:
 
 
 # Distance kept from things [m]; if a thing is already nearer, the robot may come nearer to it by
-# the second value [m].
+# ASIDE_M [m].
 MARGIN_M, ASIDE_M = 0.03, 0.005
 # The robot stops this far before the margin [m].
 STOP_M = 0.03
-# Largest speed of things that approach, which must not reach the robot before it stands [m/s]; time
-# in which the robot reacts [s]; angle to its heading beyond which things are behind it and do not
-# count [rad].
+# Assumed speed of approaching things, which must not reach the robot before it stands [m/s];
+# reaction time of the robot [s]; things at a larger angle to its heading do not count [rad].
 WALK_M_S, LATE_S, AHEAD_RAD = 0.5, 0.25, math.radians(120.0)
 
 
@@ -144,8 +143,8 @@ def speed_beside(
     """Return the highest speed from which the robot can stop before a moving thing touches it
     [m/s], and that thing; infinity and None without such a thing.
 
-    The gap must be at least the distance of the robot until it has reacted and braked, plus that of
-    the thing in the same time: v late + v^2 / 2a + walk (late + v / a).
+    The gap must be at least the distance that the robot drives until it has reacted and braked,
+    plus the distance of the thing in the same time: v late + v^2 / 2a + walk (late + v / a).
     """
     nearest, decides = NOTHING
     for thing in things:
@@ -243,7 +242,7 @@ class Sight:
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
 
     def take_map(self, payload: bytes, *, is_update: bool = False) -> None:
-        """Take in a map, or an update of it; malformed ones are ignored, as by the daemon."""
+        """Take in a map, or an update of it; malformed messages are ignored, as by the daemon."""
         with suppress(MalformedMessage):
             if not is_update:
                 self._grid = read_grid(payload)
@@ -268,7 +267,7 @@ class Sight:
         self._look(points, pose, now)
 
     def trouble(self, frame: str, now: float) -> Reason | None:
-        """Return why the robot must stand, with figures; None if it can see in the path's frame."""
+        """Return why the robot must stand, with figures; None if scan and map are usable."""
         if self._fault is not None:
             return self._fault
         if self._grid is None:
@@ -306,7 +305,7 @@ class Sight:
         return Limit(0.0, f"{why} {far:.2f} m away", around)
 
     def _look(self, points: list[Point], pose: Pose2D, now: float) -> None:
-        """Keep the points that count, and separate standing things from those that may move."""
+        """Keep the points that count, and separate standing things from things that may move."""
         cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
         own = OWN_SHARE * self._radius
         places: dict[tuple[int, int], list[Point]] = {}

@@ -1,11 +1,11 @@
 """Standstill: how long something has kept the robot from driving, and its report to the daemon.
 
-It ends once the robot gets by, or another path leads it away. The daemon can plan around the
-obstacle, or make a new plan from the robot's position.
+A standstill ends once the robot gets past the obstacle, or another path leads it away. The daemon
+can plan around the obstacle, or make a new plan from the robot's position.
 
 Failed tries to drive are counted for each place and direction of the path, until there is progress.
 A new path in the same direction does not reset the count, as it leads into the same obstacle. After
-each try there is a pause, twice as long as the one before.
+each try there is a pause, twice as long as the last pause.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def floor_ahead(here: Point, toward: float, radius: float) -> tuple[Point, ...]:
     return tuple((x + radius * math.cos(a), y + radius * math.sin(a)) for a in angles)
 
 
-# Directions nearer to each other than this are one [rad]: a place has at most eight.
+# Directions nearer to each other than this count as the same [rad]: a place has at most eight.
 ALIKE_RAD = math.pi / 4
 
 
@@ -108,13 +108,13 @@ class _Direction:
 
 
 class Tries:
-    """Counts failed tries in one place; forgets them once the robot has left it.
+    """Counts failed tries in one place; forgets them once the robot has left the place.
 
     Args:
         far: distance from the place that counts as progress [m].
         pause: first pause, after the first failed try [s].
         longest: the longest pause [s].
-        most: number of tries; after the last one only progress ends the pause.
+        most: number of tries; after the last try only progress ends the pause.
     """
 
     def __init__(self, far: float, pause: float, longest: float, most: float = math.inf) -> None:

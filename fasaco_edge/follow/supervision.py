@@ -1,6 +1,6 @@
 """Supervision of a follower's inputs: a daemon that plans, its path, and the robot's pose.
 
-No clock, no session: the caller passes the monotonic time.
+It has no clock and no session: the caller passes the monotonic time.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fasaco_edge.wire.messages.poses import Link
 
 _Result = TypeVar("_Result")
 
-# Timeout of the links of poses from transforms [s], which may be older than poses.
+# Timeout of a transform between map and robot [s]; transforms may be older than poses.
 LINK_S = 2.0
 
 
@@ -101,7 +101,6 @@ class Supervision:
         self._pose_at = -math.inf
         self._frame, self._stamp_ns, self._repeats = "", 0, False
         self._path_most_m_s = math.inf
-        # Why there is no path.
         self._no_path: Reason = FollowerState.NO_PATH, ""
         self._planner = self._path_of = ""
         self._statuses, self._status_at = 0, -math.inf
@@ -133,7 +132,7 @@ class Supervision:
         self._have(points)
 
     def take_planner(self, planner: str) -> None:
-        """Note which daemon plans, "" without one; a path of the previous one is dropped."""
+        """Note which daemon plans, "" without one; a path of the previous daemon is dropped."""
         if planner == self._planner:
             return
         self._planner, self._statuses, self._status_at = planner, 0, -math.inf
@@ -142,7 +141,7 @@ class Supervision:
             self._path_of = ""
 
     def take_heartbeat(self, now: float) -> None:
-        """Take in that a status of the planner arrived; the first one may be old and is ignored."""
+        """Take in that a status of the planner arrived; the first may be old and is ignored."""
         self._statuses += 1
         if self._statuses > 1:
             self._status_at = now

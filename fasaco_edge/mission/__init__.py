@@ -1,6 +1,6 @@
 """Mission: what to cover and when to replan; events in, decisions out.
 
-A folder imports only folders below it, and the files beside them: from top to bottom
+A folder imports only folders and files listed below it:
 
     core        step(events, now) -> Decision: applies events, then decides by rules in their order
     line        the line that is driven, between the walk over cells and the published path
@@ -14,9 +14,9 @@ A folder imports only folders below it, and the files beside them: from top to b
     events      events and decisions; config: configuration
     orders      orders and commands as people give them
 
-A verb has one meaning in all of them:
+A verb has one meaning in all these modules:
 
-    receive, receive_x      take in what comes from outside: a message, or a pose, map or plan in it
+    receive, receive_x      take in a message from outside, or a pose, map or plan in it
     record, record_x        keep what the mission itself has found or done
     update, update_x        compute from other state again
     reset; forget_x         forget everything; forget one thing

@@ -1,8 +1,8 @@
 """Company: the interface of a mission to other robots in its building, here for a single robot.
 
 The mission of a robot in a fleet gets the ``Company`` of ``fleet.mission`` instead, by a
-``company_kind``; it knows nothing else of the fleet. The company of a fleet divides the area among
-robots, and decides which robot waits for which.
+``company_kind``; the mission knows nothing else of the fleet. The company of a fleet divides the
+area among robots, and decides which robot waits for which.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Company:
         """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
 
         Args:
-            open_cells: mask function: a window to the cells that still need a visit.
+            open_cells: returns which cells of a window still need a visit.
             cell: this robot's cell.
             now: time [s].
             at_once: whether this robot is out of work.
@@ -62,14 +62,14 @@ class Company:
         area: ReachableArea,
         unvisited: NDArray[np.bool_] | None = None,
     ) -> NDArray[np.bool_]:
-        """Return which cells are this robot's to visit.
+        """Return the cells that this robot has to visit.
 
-        Given the ``unvisited`` ones among them: those on which it sweeps the floor, visited or not.
+        With ``unvisited``, a part of ``cells``, return the cells on which it has to sweep floor.
         """
         return cells
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_] | None:
-        """Leave this robot's part of cells tried in vain to the others, also after new maps.
+        """Leave this robot's part of cells tried in vain to the others, until ``try_again``.
 
         Returns:
             The cells that this robot has not given up; None if no others are at work.
@@ -80,7 +80,7 @@ class Company:
         """Leave this robot's part of cells that it cannot reach to the others, until the next map.
 
         Returns:
-            Whether there were any; False if no others are at work.
+            Whether there were such cells; False if no others are at work.
         """
         return False
 
@@ -88,7 +88,7 @@ class Company:
         """Clear the list of cells given up."""
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
-        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        """Return the part of an area reachable from ``cell`` around robots in the way."""
         return area
 
     def viewpoints(self, open_cells: OpenCells, cell: Cell) -> Iterator[Cell]:
@@ -109,7 +109,7 @@ class Waiting:
         """Take over the state of a predecessor."""
 
     def decide(self, state: State, now: float, *, may_drive: bool) -> Doing | None:
-        """Return what the robot does while it waits or makes way; None if it need not.
+        """Return what the robot does while it waits or makes way; None if it does neither.
 
         Args:
             state: state of the mission so far.
@@ -119,5 +119,5 @@ class Waiting:
         return None
 
     def why_stuck(self, now: float) -> str:
-        """Return why the robot seems stuck for good, or ""."""
+        """Return why the robot seems permanently stuck, or ""."""
         return ""

@@ -16,7 +16,7 @@ from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.living_trail import PAPERS_RULES, TrailRules
 
 if TYPE_CHECKING:
-    # Importing it at run time would load numba; the configuration needs only the policy from here.
+    # For types only: at run time, these imports would load numba.
     from fasaco_edge.grid.lattice import Footprint
     from fasaco_edge.planners.curve_config import CurveConfig
     from fasaco_edge.planners.line import LineConfig
@@ -60,7 +60,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         autostart: whether a mission without an order covers everything once.
         retries: number of times that cells blocked or left over are tried again at the end.
         retry_s: pause before each retry [s].
-        lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
+        lost_pose_s: the pose is lost after this time without a pose [s]; 0 for never.
         stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
         until_min: time after which an order without a time limit of its own ends, with the robot at
             home [min]; 0 for no limit.
@@ -72,8 +72,8 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         dock: where it charges; None if it does not.
         map_frame: frame of the map to which zones, keep_out, a mask of a file, home and dock
             belong; "" for the first map used with them.
-        by_room: whether a room is finished before the next is begun: if that costs little, or
-            always; with other robots, "always" has the effect of "auto".
+        by_room: whether a room is finished before the next is begun; "auto": if that costs little.
+            With other robots, "always" has the effect of "auto".
     """
 
     autostart: bool = True
@@ -123,7 +123,7 @@ NO_PATIENCE = MissionPolicy(retries=0, lost_pose_s=0.0)
 
 @dataclass(frozen=True, slots=True)
 class Sweeping:
-    """Sweeping of floor, and its prices.
+    """How floor is swept, and the prices of sweeping.
 
     Attributes:
         tool_m: width of the tool [m]; cells may be narrower, so that lanes overlap.
@@ -132,7 +132,7 @@ class Sweeping:
         ahead_m: distance of the tool's centre ahead of the robot's centre of rotation [m]: swept
             floor is computed with it, lines are planned as if it were 0.
         clearance_m: distance of lines from walls and furniture in addition to the radius [m].
-        curves: of a robot with a turning radius; None for a robot that turns on the spot.
+        curves: rules for curves of a robot with a turning radius; None if it turns on the spot.
     """
 
     tool_m: float
@@ -161,7 +161,7 @@ class MissionConfig:
         speed_m_s: speed of the robot; 0 if not known [m/s].
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
             them with the walls, once their direction is certain.
-        given: the policy with its places as configured; None if ``policy`` has them unrotated.
+        given: the policy with its places in the map frame; None if ``policy`` has them there.
     """
 
     footprint: Footprint

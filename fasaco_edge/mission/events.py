@@ -250,12 +250,12 @@ class PlanRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathUpdate:
-    """A path to publish; it replaces the previous one.
+    """A path to publish in place of the previous path.
 
     Attributes:
         revision: counts the published paths, from 1.
         cells: int32 (n, 2), the cells (row, col) still to be driven; n = 0 stops the robot.
-        reason: why it replaces the previous one.
+        reason: why it replaces the previous path.
         plan: the plan that it comes from; None if none was needed.
         plan_s: planning time [s].
         changed: window of the cells that changed, if they are the reason; else None.
@@ -264,7 +264,7 @@ class PathUpdate:
         yaw: float64 (m,), the robot's headings at ``xy`` [rad]; None for headings along the line.
         may_wait: whether it may be published later: the robot can follow the previous path up to
             the first difference.
-        speed_m_s: speed to drive it at [m/s]; None for the robot's usual one.
+        speed_m_s: speed to drive it at [m/s]; None for the robot's usual speed.
     """
 
     revision: int
@@ -296,7 +296,7 @@ class Decision:
 
     Attributes:
         plan: a plan to make; at most one is pending at a time.
-        path: a path to publish; the last one of the step.
+        path: the path to publish, the last one of the step.
         faults: reasons for refused events, and other faults.
         answers: answers to the commands among the events, in order.
         forgotten: whether the ledger on disk is to be deleted, too.

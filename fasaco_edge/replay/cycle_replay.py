@@ -96,7 +96,7 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
             gap = f"turns {turns + 1} to {batch.first - 1} are not in the recording"
             break
         if batch.times:
-            # Each batch comes just after its last cycle: the one with the least delay counts.
+            # Each batch comes just after its last cycle: the batch with the least delay counts.
             first_ns = first_ns or round(1e9 * batch.times[0])
             since_ns = log_ns - round(1e9 * batch.times[-1]) + first_ns
             began_ns = min(began_ns or since_ns, since_ns)
@@ -110,22 +110,22 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
     return CycleRecord(beginning, kernels, turns, gap, frozenset(taken), began_ns)
 
 
-def inflated_sample(told: EarlySample) -> Sample:
+def inflated_sample(early: EarlySample) -> Sample:
     """Return a sample that the turn log itself contains.
 
     Raises:
-        MalformedMessage: it cannot be inflated, or is longer than any message.
+        MalformedMessage: the sample cannot be inflated, or is longer than any message.
     """
     inflater = zlib.decompressobj()
     try:
-        payload = inflater.decompress(told.deflated, MAX_MESSAGE_BYTES)
+        payload = inflater.decompress(early.deflated, MAX_MESSAGE_BYTES)
     except zlib.error as error:
-        raise MalformedMessage(f"turn log: sample of {told.key}: {error}") from error
+        raise MalformedMessage(f"turn log: sample of {early.key}: {error}") from error
     if inflater.unconsumed_tail or not inflater.eof:
         raise MalformedMessage(
-            f"turn log: sample of {told.key}: torn, or more than {MAX_MESSAGE_BYTES} bytes"
+            f"turn log: sample of {early.key}: torn, or more than {MAX_MESSAGE_BYTES} bytes"
         )
-    return Sample(told.key, payload, told.schema)
+    return Sample(early.key, payload, early.schema)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +181,7 @@ class CycleReplay:
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
         """Yield each cycle, up to the first that differs from the recording."""
-        # A batch is played once the next one has come: all its samples have come by then.
+        # A batch is played once the next batch has come, as all its samples have come by then.
         batch: TurnBatch | None = None
         for arrival in samples:
             if arrival.topic in EMBEDDED and len(arrival.sample.payload) <= POSE_BYTES:
@@ -199,14 +199,14 @@ class CycleReplay:
 
     def _play(self, batch: TurnBatch) -> Iterator[ReplayStep]:
         drive = self._drive
-        told = {turn.number: turn for turn in batch.turns}
+        turns = {turn.number: turn for turn in batch.turns}
         for numbered in self._decoder.samples(batch.told) if batch.told else []:
             self._logged[numbered.arrival.topic].append(numbered.arrival.sample)
         for number, now in enumerate(batch.times, batch.first):
             if self.difference is not None or number > self._record.turns:
                 return
             self._at_s = 0.0 if drive.began is None else now - drive.began
-            step = self._cycle(told.get(number) or Cycle(number, drive.is_begun), now)
+            step = self._cycle(turns.get(number) or Cycle(number, drive.is_begun), now)
             self.turns += self.difference is None
             yield step
 
@@ -255,7 +255,7 @@ class CycleReplay:
             del self._samples[next(iter(self._samples))]
 
     def _plans(self, turn: Cycle) -> list[PlanReady]:
-        """Make the plan again that was finished in this cycle; return it, or none."""
+        """Make the plan finished in this cycle again; return a list, empty without a plan."""
         taken, request = turn.plan, self._request
         if taken is None:
             return []

@@ -30,7 +30,7 @@ class ReplayStep:
 
     Attributes:
         at_s: time since the first cycle [s].
-        state, reason: of the mission after the cycle; "loading" before there is a mission.
+        state, reason: state of the mission, and its reason; "loading" before there is a mission.
         changed: whether the state has changed.
         decision: the mission's decision.
         refused: errors of malformed samples.

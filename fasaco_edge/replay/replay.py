@@ -1,6 +1,6 @@
 """Replay by time: passes the samples of a recording to the daemon's inbox and mission.
 
-Time is that of the samples, and planning is counted in work, so that the same samples give the
+Time runs by the samples, and planning is counted in work, so that the same samples give the
 same decisions, bit for bit, on any machine. A recording without a turn log shows neither in which
 cycle the daemon took a sample, nor how much work a plan did. So each sample gets its own cycle,
 with cycles of the daemon's clock in between, and all plans do the same work.
@@ -74,7 +74,7 @@ class RecordedRun:
         Raises:
             BadConfiguration: this release does not know its settings.
         """
-        # The defaults are what releases did before these keys existed: they drove through cells,
+        # The defaults match releases from before these keys existed, which drove through cells,
         # along the axes of the map, and without a price for steps into other rooms.
         config = without_removed(renamed(self.config))[0]
         mission = config.get("mission", {})
@@ -221,7 +221,7 @@ class Replay:
     def _read_commands(
         self, arrivals: Sequence[Arrival]
     ) -> tuple[list[CommandReceived], list[FasacoError]]:
-        """Return the commands that the recorded daemon took, and the errors of malformed ones."""
+        """Return the commands that the daemon took, and the errors of malformed commands."""
         commands, refused = list[CommandReceived](), list[FasacoError]()
         for arrival in arrivals:
             if arrival.topic != COMMAND.name:
@@ -232,6 +232,6 @@ class Replay:
                 refused.append(error)
                 continue
             self._commands += 1
-            # The daemon accepted it, so it was allowed to forget covered cells.
+            # The daemon accepted the command, so it was allowed to forget covered cells.
             commands.append(CommandReceived(self._commands, *asked._replace(discard=True)))
         return commands, refused

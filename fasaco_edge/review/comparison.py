@@ -12,7 +12,7 @@ ANOTHER_PROBLEM = (
     *("robot.tool_width_m", "robot.radius_m", "robot.overlap", "planner.line"),
     *("building", "orders"),
 )
-# Most difference between the sides of two maps of the same building [m].
+# Largest difference between the sides of two maps of the same building [m].
 SIDE_M = 1.0
 
 Difference = tuple[str, str, str]

@@ -23,7 +23,7 @@ from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.replies import UnreachedArea, ZoneReport
 
 ENDS = ("cancel", "reset")
-# States without an order in force: in them even the same order begins anew.
+# States without an order in force: in these states even an equal order begins anew.
 OVER = states_of(Activity.NONE, Activity.NONE)
 # States without work, before a mission or in a gap of the recording.
 NOT_BEGUN = {*states_of(Activity.NONE, Activity.STARTING), "silent"}
@@ -75,7 +75,6 @@ def _document(order: MissionOrder) -> OrderDocument:
 
 
 def order_words(order: OrderDocument) -> str:
-    """Return an order as text."""
     asked = [f"zone {zone.name}" + passes_words(zone.passes or 1) for zone in order.zones] or [
         "everything" + passes_words(order.passes or 1)
     ]

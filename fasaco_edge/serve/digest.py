@@ -121,7 +121,7 @@ def _to_go_s(view: RobotState, status: Status) -> int | None:
     path = status.path
     if view.gone_since is not None or path is None:
         return None
-    # At rest only a paused robot will go on with its line.
+    # At rest only a paused robot will continue on its line.
     is_driven = status.state == "paused" or (path.steps and status.state in DRIVING)
     left_s = path.line_s if is_driven else None
     return None if not left_s or left_s > MOST_TO_GO_S else round(left_s)
@@ -155,8 +155,8 @@ def _mission(view: RobotState, status: Status) -> Digest:
 
 
 def _share(zone: ZoneReport, room: RoomReport | None, status: Status) -> float | None:
-    """Return the share of a zone: of the room's floor, as on the map, else of all the order's floor
-    if it has no other zone, else of cells; None if the zone has none."""
+    """Return the done share of a zone: of the room's floor, as on the map; else of the order's
+    floor, if it has no other zone; else of the zone's cells, None if it has none."""
     if room is not None and room.swept is not None:
         return room.swept
     floor = status.floor
@@ -239,7 +239,7 @@ def _is_polygon(corners: Corners) -> bool:
 def lately(events: EventLog) -> list[Digest]:
     """Return the documents of the newest events, the newest first."""
     entries = list(events.entries)[-MOST_ENTRIES:]
-    # The page shows wall-clock times; entries have monotonic ones.
+    # The page shows wall-clock times; entries have monotonic times.
     offset = time.time() - phrases.steady_now()
     return [
         {"at_s": round(entry.at_s + offset, 1), "text": entry.text, "tone": entry.tone}

@@ -66,7 +66,7 @@ ENDED = "left when the work was ended"
 # Reason of the mission if poses come too seldom, and its words for the owner.
 FAR_APART = "poses are too far apart"
 SELDOM = "it may have missed that: its place was not known often enough"
-# Share of the reachable floor above which unswept floor has this reason.
+# Share of the reachable floor above which unswept floor may have this reason.
 MUCH = 0.1
 PASSED, BESIDE = 8, 16
 MARKS = {
@@ -82,7 +82,7 @@ MARKS = {
 """The mark of each reason for unswept floor, see ``serve.messages.UNSWEPT_MARKS``."""
 REST = 64
 """The mark of other unswept floor, which is part of no order any more."""
-# Reasons of unreached cells that are no free floor, so that figures of floor lack them.
+# Reasons of unreached cells without free floor, which figures of floor leave out.
 NO_FLOOR = ("no longer free on the map", "unknown to the map")
 # Least area that is listed [m2].
 LEAST_M2 = 0.05
@@ -171,8 +171,8 @@ class LeftFloor:
 def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
     """Return the unswept floor of an order, the largest part first.
 
-    ``ordered``: the newest status with an order, which may be over by now; None if no such status
-    has come: how much an order left that was cancelled before is not known then.
+    ``ordered``: the newest status with an order, which may be over by now; None before the first:
+    then it is unknown how much a cancelled order left.
     """
     is_ended, found = status.mission.ordered is None, dict[str, LeftFloor]()
     if is_ended and not (status.floor and status.floor.swept_m2):
@@ -194,7 +194,7 @@ def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
         reason = _why_closed(of) if part.reason == CLOSED else LEFT.get(part.reason, OTHERWISE)
         _add(found, reason, part.m2, MARKS.get(part.reason, 0))
     for area in mission.unreached.areas:
-        # If the status has figures of floor, only cells outside of them count: none counts twice.
+        # If the status has figures of floor, only areas that these leave out count.
         if floor.left is None or area.reason in NO_FLOOR:
             is_tried = area.reason.startswith(TRIED)
             reason = NOT_REACHED if is_tried else LEFT.get(area.reason, OTHERWISE)

@@ -67,7 +67,6 @@ def _rows(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet
 
 
 def state_colour(state: str) -> str:
-    """Return the colour of a state."""
     colour = row_of(state).colour
     return SHADES.get(colour, colour)
 

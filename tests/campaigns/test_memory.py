@@ -63,7 +63,7 @@ def test_a_smaller_memory_limit_refuses_large_maps(tmp_path):
         assert group.kills == 0
     assert (row.outcome, row.broken) == ("refused", "")
     log = next(tmp_path.glob("daemon*.log")).read_text()
-    assert f"may need {needed_bytes(DaemonConfig()) / 1e6:.0f}: no more than" in log
+    assert f"may need {needed_bytes(DaemonConfig()) / 1e6:.0f} MB: they are reduced to" in log
 
 
 @limited

@@ -236,7 +236,7 @@ def test_a_removed_key_without_a_value_is_ignored(load):
             "flow sequence that begins in line 2",
         ),
         ("robot:\n\tname: x", "line 2, column 1: a tab: indent by spaces"),
-        ("robot:\n  name: a\n radius_m: 1", "line 3, column 2: indented otherwise than"),
+        ("robot:\n  name: a\n radius_m: 1", "line 3, column 2: indented differently from"),
         ("robot: {name: a\nbus: {}", "line 2, column 4: expected ',' or '}'"),
         ("robot: 2020-13-45", "not plain YAML: month must be in 1..12"),
         ("[" * 5000, "not plain YAML: line 1: nested deeper than 32 levels"),

@@ -72,7 +72,7 @@ def test_once_rooms_are_known_the_robot_finishes_its_own():
     drive.plan()
     while drive.request is None:
         drive.tell(pose_at(*drive.cell), after=1.0)
-    assert drive.request.reason == "rooms have changed: another one first"
+    assert drive.request.reason == "rooms have changed: another room first"
     assert planned(drive) == (89, 0)
     drive.finish()
     assert rooms_swept(drive) == ["west", "east"]
@@ -85,7 +85,8 @@ def test_a_path_ends_at_home_only_in_the_last_room():
     drive.plan()
     while drive.request is None:
         drive.go()
-    assert (drive.request.reason, planned(drive)) == ("what comes first is done: the rest", (0, 90))
+    assert drive.request.reason == "floor planned first is done: the rest"
+    assert planned(drive) == (0, 90)
     assert drive.request.problem.end == IN_WEST
     drive.finish()
 
@@ -138,7 +139,7 @@ def test_if_the_robot_turns_out_to_be_in_a_new_room_it_finishes_that_first():
     cut = ((0.0, 1.0), (2.5, 1.0))
     drive.command("room_split", room=RoomRequest(room_at(drive, *IN_WEST).id, cut=cut))
     drive.tell(pose_at(*drive.cell))
-    assert drive.request.reason == "rooms have changed: another one first"
+    assert drive.request.reason == "rooms have changed: another room first"
     assert planned(drive) == (4 * len(WEST_COLUMNS) - 1, 0), "the smaller part, with a new number"
     drive.finish()
 

@@ -102,7 +102,7 @@ def test_a_robot_that_turns_out_too_slow_turns_to_what_matters():
     reasons = [each.reason for each in drive.updates]
     assert "not all can be done in time: the most worthwhile floor first" in reasons
     assert finish(drive)[1] == 90
-    assert "what comes first is done: the rest" in [each.reason for each in drive.updates]
+    assert "floor planned first is done: the rest" in [each.reason for each in drive.updates]
 
 
 def test_after_the_time_limit_no_floor_comes_first():

@@ -37,7 +37,7 @@ AT_ONCE = 64
 
 @dataclass(frozen=True, slots=True)
 class _Member:
-    """A robot's answer, None if it is not valid, and why it refused the command, or ""."""
+    """A robot's answer, None if it is not valid; the reason of a refusal, else ""."""
 
     robot: str
     document: dict[str, object] | None
@@ -51,13 +51,13 @@ Shown = Callable[[replies.Reply], str]
 def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Shown | None) -> int:
     """Send a command to each robot of the fleet, and show the answers; 0 if all accept it.
 
-    On a terminal, it asks once for consent for all robots that would forget covered cells.
+    On a terminal, it asks for consent once if any robots would forget covered cells.
 
     Args:
         args: arguments of the command line.
         asked: the command as a document.
-        shown: returns the text to show of an answer; None to show that the command
-            is accepted, and the reason of the robot's state.
+        shown: returns the text for the answer of a robot that accepts; None for "accepted" and the
+            reason of the robot's state.
 
     Raises:
         NobodyAnswersError: no robot of this fleet answers.
@@ -90,7 +90,7 @@ def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Sho
     if args.json:
         print_json({member.robot: member.document for member in members})
     else:
-        # The reason of the state is no answer to a command: it may be that of the path.
+        # The reason explains the robot's state, which may have nothing to do with the command.
         accepted = "" if asked.get("command") == "status" else "accepted: "
         shown = shown or (lambda answer: f"{accepted}{plain(answer.reason)}".removesuffix(": "))
         out().print(_table(args.fleet, members, shown))
@@ -98,14 +98,14 @@ def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Sho
 
 
 def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
-    """Return the names of the robots of a fleet, in order.
+    """Return the sorted names of the robots of a fleet.
 
-    These are the robots that answer, and the robots that their statuses list as received recently:
-    a robot that is frozen, or has lost its network, may still drive.
+    These are the robots that answer, and the robots from which these recently received messages: a
+    robot that is frozen, or has lost its network, may still drive.
     """
     statuses = []
     for reply in bus.get(f"{keys.base}/{VERSION}/*/@rpc/status", timeout_s):
-        # An answer that is no status must not stop the command to the other robots.
+        # An invalid status must not stop the command to the other robots.
         with suppress(MalformedMessage):
             statuses += [] if reply.is_error else [decode_tolerant(reply.payload, Status)]
     names = set[str]()
@@ -121,7 +121,7 @@ def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
     raise NobodyAnswersError(
         f"no robot of a fleet {one_line(fleet)!r} answers",
         hint=f"{len(statuses)} robots answer, of these fleets: {fleets or 'none'}; "
-        "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
+        "`fleet: {name: ...}` in the configuration of a robot makes it a member",
     )
 
 
@@ -140,7 +140,7 @@ def _member(robot: str, found: list[QueryReply]) -> _Member:
         return _Member(robot, document, "")
     refusal = tolerant(document, replies.Error)
     is_loss = refusal.code == WouldForget.code
-    yes = "; to forget that, give it with --yes" if is_loss else ""
+    yes = "; to forget these cells, give it with --yes" if is_loss else ""
     return _Member(robot, document, f"refused: {refusal.message}{yes}", is_loss)
 
 

@@ -32,7 +32,7 @@ def print_fleet(args: argparse.Namespace) -> int:
     """
     for name in ONE_ROBOT_OPTIONS:
         value = getattr(args, name)
-        # Compared with None, as 0 is a time.
+        # Compared with None, as 0 is a valid time for --at.
         if value is not None and value is not False:
             raise BadConfiguration(
                 f"--{name}: this is the recording of a fleet",

@@ -44,10 +44,10 @@ if TYPE_CHECKING:
 
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
-# Limit on the tiles of progress, and on those of ground, in a periodic message (once a second) and
-# in a message on a change. A robot sends 20 kB/s, and up to 27 kB/s after a change of the epoch.
+# Most tiles of swept cells, and also of ground, in a periodic message (once a second) and in a
+# message on a change. A robot sends 20 kB/s, and up to 27 kB/s after a change of the epoch.
 TILES, FEW_TILES = 10, 2
-# Members that a robot's document and its event have in common.
+# Members with the same names in a robot's message and in its event.
 ALIKE = ("state", "x", "y", "step_s", "epoch", "division", "by", "radius_m", "waits_for")
 
 # Least time between two messages of a robot [s].
@@ -80,8 +80,8 @@ class FleetArrivals:
         # Time of each key's last message [s], oldest first: robots of this fleet; other publishers.
         self._received_at: dict[str, float] = {}
         self._strange_at: dict[str, float] = {}
-        # The loop gets some messages whose fleet is unreadable, to report the fault: time of the
-        # last [s].
+        # Time of the last message with an unreadable fleet that was passed to the loop, which
+        # reports the fault [s].
         self._unreadable_at = float("-inf")
         self._has_refused = False
         self._faults = deque[FasacoError](maxlen=1)
@@ -167,10 +167,10 @@ class FleetReceiver:
         bus.subscribe(self._keys.of_all(FLEET), post_due)
 
     def event(self, sample: Sample) -> MemberReceived | None:
-        """Return another robot's message as an event; None from another fleet.
+        """Return another robot's message as an event; None if the robot is of another fleet.
 
         Raises:
-            MalformedMessage: it is malformed.
+            MalformedMessage: the message is malformed.
         """
         robot = self._keys.robot_of(sample.key)
         try:
@@ -215,7 +215,7 @@ class FleetReceiver:
         return placed
 
     def take_faults(self) -> list[FasacoError]:
-        """Return the faults since the last call, except those that ``event`` raised."""
+        """Return the faults since the last call, except faults that ``event`` raised."""
         faults, self._faults = self._faults, []
         return faults + self._arrivals.take_faults()
 
@@ -274,18 +274,18 @@ class FleetSender:
         self._publisher.put(encode_json(member))
 
     def _frame_sent(self, mission: Mission) -> str:
-        """Return the fleet's frame; the map's own frame while its pose in the fleet is unknown."""
+        """Return the fleet's frame; the map's own frame while the map's pose is unknown."""
         frame = mission.covered.current.frame
         if not layer_of(mission).others.shared.why_misplaced(frame):
             return self._frame or frame
-        # Other robots must not mistake the map's frame for the fleet's.
+        # Other robots must not mistake the map's frame for the fleet's frame.
         return frame if self._frame not in ("", frame) else f"{frame} of another map"
 
 
 def _thinned(points: Sequence[Point]) -> Sequence[Point]:
     """Return a line's points [m], evenly thinned to the number that a message holds.
 
-    Both ends remain. Cells narrower than 3.2 cm give a line of 2 m too many points.
+    Both ends remain. With cells narrower than 3.2 cm, a line of 2 m has too many points.
     """
     if len(points) <= MAX_FLEET_POINTS:
         return points
@@ -310,7 +310,7 @@ def _placed(tiles: Iterable[CellTile]) -> tuple[Placed, ...]:
 
 
 def report(fleet: str, mission: Mission | None, now: float) -> FleetReport:
-    """Return the report of the fleet of this name at ``now`` [s]."""
+    """Return the report of the fleet with the name ``fleet`` at ``now`` [s]."""
     if mission is None:
         return FleetReport(fleet)
     layer = layer_of(mission)

@@ -20,10 +20,10 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.mission.events import Part
 
-# Largest number of cells used: of more cells, every second (third, ...) is used.
-# Limit on rounds x robots x cells: the number of rounds is lowered to keep it, but not below one.
+# Largest number of cells used; of a larger area, every second (third, ...) cell is used.
+# Limit on rounds x robots x cells; it reduces the number of rounds, but not below one.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
-# Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
+# Rounds of moving the seeds; updates of the handicaps; ratio of each update's size to the previous.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
 # Number of searches for handicaps with the same seeds; each uses the times per cell that resulted
 # from the previous search.
@@ -99,8 +99,8 @@ def divide(
     Args:
         lattice: the cells where robots fit.
         wanted: bool (rows, cols), the cells to divide.
-        robots: at least one. A robot without a way to any of the cells gets a seed at its own cell:
-            it owns the cells that it alone can reach, on its own map.
+        robots: at least one. A robot that can reach none of the cells gets a seed at its own cell,
+            and so owns the cells that it alone can reach.
         before: the last division; its seeds are kept unless other seeds shorten the makespan by
             much, and cells keep their robot if a change gains nothing.
         turn_steps: time of a quarter turn, in steps.
@@ -121,7 +121,7 @@ def divide(
 def _divided(
     travel: Travel, robots: Sequence[Robot], before: Division | None, turn_steps: float
 ) -> tuple[list[Cell], list[float]]:
-    """Return seeds and handicaps [s] of robots that have ways to the cells, as ``divide`` does."""
+    """Return seeds and handicaps [s] for robots that can reach the cells, see ``divide``."""
     lattice, cells = travel.lattice, travel.cells
     starts, steps_s = [robot.cell for robot in robots], np.array([one.step_s for one in robots])
     from_starts_s = travel.times_s(starts, steps_s)

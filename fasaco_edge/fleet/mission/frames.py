@@ -19,8 +19,8 @@ from fasaco_edge.grid.geometry import MOST_INDEX, Point, Pose2D
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.events import MemberReceived
 
-# Number of robots tracked at once. It exceeds the number of members: a refused robot may become a
-# member later, and would need many messages to send its tiles again.
+# Number of robots tracked at once. It exceeds the limit on members: a refused robot may become a
+# member later, and would have to send all its tiles again.
 MOST_OTHERS = 64
 
 # Smaller overlaps of tiles [cells] and smaller angles [rad] are rounding errors.
@@ -46,7 +46,7 @@ class ResampledTiles:
     """Another robot's cells, resampled on this robot's lattice.
 
     Args:
-        lattice: pose of the other lattice in this one [m].
+        lattice: pose of the other lattice in this robot's lattice [m].
         cell_m: edge of a cell of both [m].
     """
 
@@ -61,7 +61,7 @@ class ResampledTiles:
         self._shown: set[tuple[int, int]] = set()
 
     def tiles(self, tiles: Iterable[Placed]) -> tuple[Placed, ...]:
-        """Return all tiles of this robot's lattice that overlap the other's new tiles."""
+        """Return all tiles of this robot's lattice that overlap the other robot's new tiles."""
         wanted: set[tuple[int, int]] = set()
         for place, bits in tiles:
             if place not in self._given and len(self._given) >= MOST_TILES_OF_ONE:
@@ -80,12 +80,12 @@ class ResampledTiles:
         return tuple((place, self._made[place]) for place in sorted(wanted & self._shown))
 
     def cell(self, row: int, col: int) -> tuple[int, int]:
-        """Return this robot's cell (row, col) in which the centre of the other's cell lies."""
+        """Return this robot's cell that contains the centre of the other robot's (row, col)."""
         x, y = self._here(col + 0.5, row + 0.5)
         return math.floor(y), math.floor(x)
 
     def _here(self, x: float, y: float) -> Point:
-        """Return a point of the other lattice in this one [cells]."""
+        """Return a point of the other lattice in this robot's lattice [cells]."""
         cos, sin = self._cos, self._sin
         return self._shift[0] + cos * x - sin * y, self._shift[1] + sin * x + cos * y
 
@@ -141,7 +141,7 @@ class FleetFrames:
 
         Args:
             message: the message in the robot's own frames.
-            map_frame, lattice_deg: those of the other robot, see ``FleetFrames``.
+            map_frame, lattice_deg: of the other robot, as in ``FleetFrames``.
         """
         frame = seen_from(map_frame, self._map_frame)
         lattice = seen_from(turned(map_frame, lattice_deg), self._lattice)
@@ -159,7 +159,7 @@ class FleetFrames:
             y=y,
             ahead=tuple(placed_point(frame, *point) for point in message.ahead),
             tiles=swept.tiles(message.tiles),
-            # Unknown: a tile here overlaps several tiles of the other, and some may not have come.
+            # Unknown: a tile here overlaps several tiles of the other robot; some may be missing.
             kept=None,
             ground=ground.tiles(message.ground),
             parts=parts,
@@ -169,7 +169,7 @@ class FleetFrames:
     def _of(
         self, robot: str, epoch: int, lattice: Pose2D
     ) -> tuple[int, ResampledTiles, ResampledTiles]:
-        """Return a robot's entry; an empty one if its frame has moved."""
+        """Return a robot's entry; an empty entry if its frame has moved."""
         known = self._robots.get(robot)
         if known is None and len(self._robots) >= MOST_OTHERS:
             del self._robots[next(iter(self._robots))]

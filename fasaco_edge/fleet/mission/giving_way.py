@@ -49,7 +49,7 @@ BESIDE_M, MOVED_M = 0.4, 0.1
 ARRIVED_M = 0.05
 # Length of the way to the refuge that is checked for other robots [points].
 LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
-# A robot comes in the way to the refuge if its distance from this way decreases by more than this
+# A robot obstructs the way to the refuge if its distance from that way decreases by more than this
 # after the way was chosen [m].
 COMES_M = 0.05
 # A robot that has stayed within STAYS_M [m] for LONG_S [s] plans around the robot that obstructs
@@ -60,7 +60,7 @@ AGAIN_S = 2.0
 
 
 class GivingWay(Waiting):
-    """Decides when the robot waits, where it makes way to, and when it goes on.
+    """Decides when the robot waits, where it goes to make way, and when it goes on.
 
     Attributes:
         waits_for: name of the robot that it waits for; "" for none.
@@ -92,7 +92,7 @@ class GivingWay(Waiting):
         self._has_work = True
         # The path to resume after the wait, and the errand of that path.
         self._held, self._errand = NO_CELLS, ""
-        # Where the robot is free to drive on from; and where it stays.
+        # Where, and since when, the robot is free to drive on; where, and since when, it stays.
         self._free, self._stay = Stay(MOVED_M), Stay(STAYS_M)
         # Reason and time of its last wait.
         self._waited, self._waited_at = "", -math.inf
@@ -105,7 +105,7 @@ class GivingWay(Waiting):
         self._stay = before._stay
 
     def line(self) -> Points:
-        """Return the next AHEAD_M from the robot's place, as points (x, y) [m], float64 (n, 2)."""
+        """Return the path's next AHEAD_M, from the robot, as points (x, y) [m], float64 (n, 2)."""
         pose = self._map.pose
         if pose is None or self._map.ground.lattice is None:
             return np.zeros((0, 2))
@@ -128,7 +128,7 @@ class GivingWay(Waiting):
         return self._held if is_held else self._route.path.ahead
 
     def decide(self, state: State, now: float, *, may_drive: bool) -> Doing | None:
-        """Return what the robot does while it waits or makes way; None if it need not.
+        """Return what the robot does while it waits or makes way; None if it does neither.
 
         A robot whose order is over makes way, too.
         """
@@ -175,11 +175,11 @@ class GivingWay(Waiting):
         A robot without work left makes way, but does not wait: it has no path of its own. A change
         of the errand ends the wait: the new way may not lead past the other robot.
 
-        The first case that holds:
+        The first case that holds decides:
 
         | case | this robot |
         |---|---|
-        | it has no place, or no other robot is within NEAR_M | goes on |
+        | its place is unknown, or no other robot is within NEAR_M | goes on |
         | it is on its way to a refuge, for PATIENCE_S at most | goes there |
         | another robot obstructs it (``traffic.obstruction``) | waits or makes way |
         | it was free to drive, and stood for PATIENCE_S beside another robot | is blocked by it |
@@ -188,7 +188,7 @@ class GivingWay(Waiting):
         if errand != self._errand:
             self._errand = errand
             self._end()
-        # The search for a refuge starts at the robot: on a short cut it is far from its path.
+        # The search for a refuge starts at the robot, which is far from its path on a short cut.
         area, cell, pose = self._map.area, self._map.cell_at_pose(), self._map.pose
         here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
         self._note_place(here, now)
@@ -218,7 +218,7 @@ class GivingWay(Waiting):
             self._failed_refuge = None
 
     def _is_underway(self, here: tuple[float, float], now: float) -> bool:
-        """Return whether the robot drives to its refuge, and no robot has come in its way."""
+        """Return whether the robot drives to its refuge, and no other robot obstructs the way."""
         ahead = self._route.path.ahead
         is_there = self._refuge is None or self._is_in(self._refuge, here)
         is_stuck = now - self._sought_at > PATIENCE_S
@@ -251,7 +251,7 @@ class GivingWay(Waiting):
     def _sees(self, area: ReachableArea, a: Points, b: Points) -> bool:
         """Return whether the robot can drive straight between two points, (2,): x, y [m].
 
-        Without a map of the floor, the points must be in one cell, or in two that a step joins.
+        Without a map of the floor, the points must be in one cell, or in two joined by a step.
         """
         if self._map.ground.floor is not None:
             return sees_on(self._map.ground.floor, a, b)
@@ -287,13 +287,13 @@ class GivingWay(Waiting):
     ) -> PathUpdate | None:
         route, neighbours = self._route, self._neighbours
         if found.robot != self.waits_for:
-            # A wait for another robot at the same place continues the time of this wait.
+            # The time of waiting goes on if only the other robot has changed.
             self._since = self._stay.since
         was_waiting = bool(self.waits_for)
         self.waits_for, self._reason = found.robot, found.reason
         has_path = len(route.path.cells) > 0
         ahead = route.path.ahead
-        # A new order has a new path.
+        # A new order during the wait brings a new path.
         if route.set_aside() or not was_waiting:
             self._held = ahead
         is_long = now - self._since > PATIENCE_S or self._is_stalled(now)

@@ -39,7 +39,7 @@ class FleetKind(CompanyKind):
     def company(
         self, config: MissionConfig, map_state: MapState, ledger: MissionLedger
     ) -> FleetLayer:
-        """Return the other robots."""
+        """Return the part of the mission that divides the area among the robots."""
         return FleetLayer(self.robot, config.cost, config.footprint, map_state, ledger)
 
     def waiting(
@@ -56,12 +56,12 @@ class FleetKind(CompanyKind):
 
 
 def layer_of(mission: Mission) -> FleetLayer:
-    """Return the other robots of a mission, which must be of ``FleetKind``."""
+    """Return the fleet layer of a mission, which must be of ``FleetKind``."""
     assert isinstance(mission.company, FleetLayer)
     return mission.company
 
 
 def giving_way_of(mission: Mission) -> GivingWay:
-    """Return what decides when the robot waits in a mission, which must be of ``FleetKind``."""
+    """Return the ``GivingWay`` of a mission, which must be of ``FleetKind``."""
     assert isinstance(mission.giving_way, GivingWay)
     return mission.giving_way

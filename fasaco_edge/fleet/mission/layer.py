@@ -28,13 +28,13 @@ from fasaco_edge.mission.events import MemberReceived, Part
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.planners.cost import CoverageCost
 
-# Period of checks; least age of a division at which a new one replaces it, in general and for
+# Period of checks; least age of a division at which a new division replaces it, in general and for
 # balance [s]. A robot that leaves causes a new division at once.
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
 # Parts are rebalanced only above this ratio and this difference [s].
 UNEVEN, UNEVEN_S = 1.25, 40.0
-# Number of cells of this robot's part that others sweep before it plans again. Robots that only
-# pass through sweep fewer: in unknown buildings a value of 4 cost 7 % of two robots' time.
+# Number of cells of this robot's part that others sweep before it plans again. A robot that only
+# passes through sweeps fewer: in unknown buildings, a value of 4 cost two robots 7 % of their time.
 MANY_TAKEN = 30
 Mask = NDArray[np.bool_]
 LATER = "another robot has a newer division"
@@ -108,7 +108,7 @@ class FleetLayer(Company):
     def viewpoints(self, open_cells: OpenCells, cell: Cell) -> Iterator[Cell]:
         """Yield viewpoints for cells that only maps of others show.
 
-        First for cells of this robot's part, then for any cells beyond doors that others show open.
+        First for cells of this robot's part, then for any cells beyond doors open on these maps.
         """
         area, division = self._map.area, self._division
         if area is None or not self.others.known:
@@ -141,7 +141,7 @@ class FleetLayer(Company):
         return self._division is not None and self._remainder.others_go_on
 
     def mine(self, cells: Mask, area: ReachableArea, unvisited: Mask | None = None) -> Mask:
-        """Return which cells are this robot's to visit or, given the unvisited ones, to sweep.
+        """Return the cells that this robot has to visit or, if ``unvisited`` is given, to sweep.
 
         These are the cells of its part; or all, if no unvisited cell of its part is reachable and
         the others make no progress. Visits to cells that it has given up are left to the others.
@@ -256,7 +256,7 @@ class FleetLayer(Company):
     def _why_by_parts(
         self, division: Division, joint: ReachableArea, left: Mask, names: set[str], now: float
     ) -> str:
-        """Return why the parts should change, or ""; ``names``: this robot and those in reach."""
+        """Return why the parts should change, or ""; ``names``: this robot, and robots in reach."""
         owners = self._owners_on(division, joint)
         cells = np.bincount(owners[left], minlength=len(division.parts))
         if not cells[division.names.index(self._robot)]:

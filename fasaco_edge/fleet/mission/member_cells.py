@@ -53,11 +53,11 @@ class MemberCells:
 
     @property
     def count(self) -> int:
-        """Number of cells that count."""
+        """Number of cells that are not disregarded."""
         return sum(cells_in(self.counted(place)) for place in self.tiles)
 
     def counted(self, place: Cell) -> Bits:
-        """Return the bits of a tile that count."""
+        """Return the bits of a tile that are not disregarded."""
         tile, without = self.tiles[place], self.disregarded.get(place)
         return tile if without is None else tile & ~without
 
@@ -80,7 +80,7 @@ class Kept(msgspec.Struct, frozen=True, array_like=True):
     is_doubtful: bool = False
 
     def restored(self, *, is_in_place: bool) -> MemberCells:
-        """Restore the cells; without tiles if this robot's own lattice has moved since."""
+        """Restore the cells; without tiles if this robot's lattice has moved since."""
         tiles = _placed(self.tiles) if is_in_place else {}
         lattice, without = Pose2D(*self.lattice), _placed(self.disregarded)
         return MemberCells(self.epoch, lattice, tiles, without, self.is_doubtful)

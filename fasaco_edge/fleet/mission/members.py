@@ -1,4 +1,4 @@
-"""Members of a fleet: the other robots, the last message of each, and those that block the way."""
+"""Members of a fleet: the other robots, their last messages, and the robots that block the way."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ class Member:
     left_at: float = float("-inf")
 
     def has_moved(self, message: MemberReceived) -> bool:
-        """Return whether it has moved, has started to work, or has just ended a wait."""
+        """Return whether the robot has moved, has started to work, or has just ended a wait."""
         has_begun = self.newest.state not in AT_WORK and message.state in AT_WORK
         has_begun |= bool(self.newest.waits_for) and not message.waits_for
         return has_begun or math.dist(self.place, (message.x, message.y)) > STANDING_M
 
     def absence(self, now: float) -> str:
-        """Return why it takes no part now; "" if it does."""
+        """Return why the robot takes no part in the work at ``now``; "" if it does."""
         if self.left_out:
             return self.left_out
         if now - self.received_at > GONE_S:
@@ -73,7 +73,7 @@ class Members:
 
     Attributes:
         known: the others, by name.
-        ground: the cells that the robots with a fitting frame can reach.
+        ground: the cells that the others can reach, except robots that are left out.
     """
 
     def __init__(self, robot: str, ledger: MissionLedger, cell_m: float) -> None:
@@ -84,7 +84,7 @@ class Members:
         self._avoided: dict[str, tuple[float, float]] = {}
 
     def neighbours(self, now: float) -> dict[str, Neighbour]:
-        """Return the other robots in this robot's frame, except silent ones.
+        """Return the other robots in this robot's frame, except silent robots.
 
         The place of a silent robot is not known; this robot's map may show it.
         """
@@ -117,14 +117,14 @@ class Members:
         return robot in self._avoided
 
     def _is_at_avoided(self, robot: str) -> bool:
-        """Return whether paths are planned around a robot that is still there."""
+        """Return whether paths are planned around a robot that still stands there."""
         place, member = self._avoided.get(robot), self.known.get(robot)
         if place is None or member is None or member.left_out:
             return False
         return math.dist(place, (member.newest.x, member.newest.y)) < LEFT_M
 
     def forget_silent(self, now: float) -> str:
-        """Stop planning around silent robots; return the name of one, or "".
+        """Stop planning around silent robots; return the name of one of them, or "".
 
         Only this robot's map shows whether a silent robot still stands there.
         """

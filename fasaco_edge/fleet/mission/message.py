@@ -36,7 +36,7 @@ class Messages:
         Args:
             mission: mission of the robot.
             most: largest number of tiles of progress, and also of tiles of ground.
-            most_anew: the same for the first message of an epoch.
+            most_anew: ``most`` for the first message of an epoch.
         """
         if mission.pose is None or not mission.covered.current.frame:
             return None
@@ -46,7 +46,7 @@ class Messages:
             mission.covered.current.snapshot().tiles,
         )
         if layer.others.shared.epoch != self._epoch:
-            # A new epoch sends all tiles again. In the first, the cells swept before it are
+            # All tiles are sent again in a new epoch. Cells swept before the first epoch are
             # unknown.
             before = tiles if self._epoch else None
             self._epoch, self._swept, most = (

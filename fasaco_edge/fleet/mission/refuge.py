@@ -44,9 +44,9 @@ def refuge(
 ) -> NDArray[np.int32] | None:
     """Return the cells of the way to the refuge, int32 (n, 2), or None.
 
-    The refuge is the nearest cell off the discs and paths of other robots; the way avoids their
-    discs. The way begins at the robot's cell or a cell beside it: the robot can drive there without
-    coming nearer to any robot. If there is no such way, it begins at the robot's cell anyway.
+    The refuge is the nearest cell outside the discs of other robots and off their paths; the way
+    avoids their discs. The way begins at the robot's cell or a cell beside it, where the robot can
+    drive without coming nearer to another robot. Else it begins at the robot's cell.
 
     Args:
         area: the reachable area.

@@ -64,7 +64,7 @@ class SharedProgress(OthersCells):
     """The cells that other robots have swept, on this robot's lattice.
 
     Args:
-        place: pose of its map in the frame of the fleet; None without such a frame.
+        place: pose of the robot's map in the frame of the fleet; None without such a frame.
 
     Attributes:
         epoch: epoch of this robot's own cells; 0 without a fleet.
@@ -73,7 +73,7 @@ class SharedProgress(OthersCells):
 
     def __init__(self, place: MapPlace | None = None) -> None:
         self._place = place
-        # The frame of the map that has this place; "" before the first map.
+        # The frame of the map whose pose is ``place``; "" before the first map.
         self._map_frame = "" if place is None else place.frame
         # The frame whose map now shows another building; "" for none.
         self._left = ""
@@ -87,7 +87,7 @@ class SharedProgress(OthersCells):
         self._encoded: tuple[int, bytes] = 0, b""
 
     def begin_epoch(self, epoch: int) -> None:
-        """Start an epoch that no earlier ledger of this robot used, unless one was restored."""
+        """Start an epoch unused by earlier ledgers of this robot, unless an epoch was restored."""
         if not self.epoch:
             self.epoch = epoch
             self.version += 1
@@ -109,12 +109,12 @@ class SharedProgress(OthersCells):
             self.version += 1
 
     def leave_building(self, frame: str) -> None:
-        """Note that the map in a frame now shows another building, without the cells of others."""
+        """Note that the map in a frame now shows another building, without cells of others."""
         self._left = frame
         self.version += 1
 
     def reset(self) -> None:
-        """Accept the next map as the one that the fleet shares."""
+        """Accept the next map as the map with the configured place."""
         self._left = ""
         self.version += 1
 
@@ -147,7 +147,7 @@ class SharedProgress(OthersCells):
             tiles: places, with TILE_BYTES of bits each.
             members: names of robots that must not be displaced.
             kept: the cells of ``tiles`` that it swept before the epoch; None if not known.
-            lattice: pose of its lattice in this robot's [m]; a change drops all its earlier cells.
+            lattice: pose of its lattice in this robot's lattice [m]; a change drops its cells.
 
         Raises:
             FleetError: there is no room for its data.
@@ -221,7 +221,7 @@ class SharedProgress(OthersCells):
             inside: returns which cells are chosen, bool (n,), for rows and columns, int64 (n,).
         """
         for place in self._places():
-            # Once for all robots, as ``inside`` takes most of the time.
+            # Called once for all robots, as ``inside`` takes most of the time.
             swept = (one.tiles[place] for one in self._robots.values() if place in one.tiles)
             at = np.argwhere(unpacked(np.bitwise_or.reduce(list(swept))))
             rows, cols = (at + np.multiply(place, TILE)).T
@@ -252,7 +252,7 @@ class SharedProgress(OthersCells):
         return LedgerSnapshot(cell_m, "", 0, MappingProxyType(tiles))
 
     def cells_of(self, robot: str) -> int:
-        """Return the number of a robot's cells that count."""
+        """Return the number of a robot's cells that are not disregarded."""
         member = self._robots.get(robot)
         return 0 if member is None else member.count
 

@@ -1,9 +1,9 @@
 """Shared ground: the cells that the robots of a fleet can reach, each on its own map.
 
 The division includes cells that only maps of other robots show, so that all robots divide nearly
-the same area. Where this robot's own map is known, it takes precedence; paths are planned on it
-alone. A door that the robot has seen only in part looks shut on its map: ``with_doors`` adds the
-cells beyond such doors.
+the same area. Where this robot's own map is known, it takes precedence; paths are planned on this
+map alone. A door that the robot has seen only in part looks shut on its map: ``with_doors`` adds
+the cells beyond such doors.
 """
 
 from __future__ import annotations
@@ -75,12 +75,12 @@ class SharedGround:
         """Return the area of ``joint`` with the ground beyond doors.
 
         A door is a cell that is blocked in the area and reachable for another robot. Ways lead
-        through it, but it is not reachable itself.
+        through it, but it does not count as reachable.
         """
         return self._with(area, doors=True)
 
     def _with(self, area: ReachableArea, *, doors: bool) -> ReachableArea:
-        # Cached, as a robot on its way to a door calls this in each step.
+        # Cached, as this is called in each step while the robot drives to a door.
         last = self._last.get(doors)
         if last is None or last[0] is not area or last[1] != self.version:
             joined = _joined(area, self._merged(), doors=doors) if self._robots else area
@@ -101,7 +101,7 @@ def viewpoint(
 ) -> Cell | None:
     """Return a viewpoint for the nearest wanted cell beyond a robot's own area, or None.
 
-    The viewpoint is the last cell (row, col) of this area on the shortest way to the wanted cell.
+    The viewpoint is the last cell (row, col) of ``area`` on the shortest way to the wanted cell.
 
     Args:
         area: cells that the robot can reach on its own map.
@@ -128,7 +128,7 @@ def viewpoint(
 
 
 class GroundQueue:
-    """Selects the tiles of the next message, see ``TileQueue``."""
+    """Selects the tiles of ground for the next message, see ``TileQueue``."""
 
     def __init__(self) -> None:
         self._queue = TileQueue[bytes](operator.eq)
@@ -200,7 +200,7 @@ def _joined(
 
 
 def _tiles_of(area: ReachableArea) -> dict[Cell, bytes]:
-    """Return the reachable cells as tiles of bits; no tile where there are none."""
+    """Return the reachable cells as tiles of bits, without empty tiles."""
     window, found = area.lattice.window, {}
     for row in range(window.row0 // TILE, -(-window.row1 // TILE)):
         for col in range(window.col0 // TILE, -(-window.col1 // TILE)):

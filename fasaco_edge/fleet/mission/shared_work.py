@@ -1,8 +1,8 @@
-"""Shared work of a fleet: which robots take part, what is left, and which division is the newest.
+"""Shared work of a fleet: the robots that take part, the cells left, and the newest division.
 
-A robot without a part stands still while the others make progress, so as not to obstruct them. Of
-two divisions, the one with the higher number is newer; between equal numbers the author whose name
-sorts first wins. Numbers too far ahead are errors of their sender.
+A robot without a part stands still while the others make progress, so as not to obstruct them. The
+division with the higher number is newer; between equal numbers, the author whose name sorts first
+wins. Numbers too far ahead are errors of their sender.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Remainder:
 
     Attributes:
         others_go_on: whether only parts of other robots are left, and these robots make progress.
-            Once they have swept nothing for STUCK_S, they are stuck until this robot has a part.
+            If they sweep nothing for STUCK_S, they count as stuck until this robot has a part.
         had_part: whether the last division gave this robot a part.
         cells_divided: number of cells left when that division was made.
     """
@@ -35,10 +35,10 @@ class Remainder:
     def __init__(self) -> None:
         self.others_go_on = self.had_part = False
         self.cells_divided = 0
-        # Largest number of swept cells since this robot had a part, and when that was reached; None
+        # Largest number of swept cells since this robot had a part, and when it last grew; None
         # while it has a part. The number of cells left is no measure: others also find new cells.
         self._most: tuple[int, float] | None = None
-        # Since when all others wait; None while one is at work.
+        # Time since which all others wait; None while one of them is at work.
         self._waiting_since: float | None = None
 
     def note_others(self, now: float, *, wait: bool) -> None:
@@ -63,7 +63,7 @@ class Remainder:
         self.others_go_on = cells > 0 and not is_stuck and waiting_s <= WAITING_S
 
     def note_division(self, cells: int, own: int, swept: int, now: float) -> None:
-        """Take in the same numbers for a new division."""
+        """Take in the numbers of cells after a new division, see ``note``."""
         self.had_part, self.cells_divided = own > 0, cells
         self.note(cells, own, swept, now)
 
@@ -76,9 +76,9 @@ MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**16, 2**24
 class DivisionNumbers:
     """Numbers the divisions of one robot, checks the numbers of others, and decides who takes part.
 
-    All robots have to agree on who takes part: each makes a new division if the last one leaves out
-    a robot that takes part. If two robots do not receive each other, or a map shows no way between
-    them, a third robot decides.
+    All robots have to agree on who takes part: each robot makes a new division if the last division
+    leaves out a robot that takes part. If two robots do not receive each other, or a map shows no
+    way between them, a third robot decides.
 
     Attributes:
         number: number of the newest division.
@@ -93,7 +93,7 @@ class DivisionNumbers:
     def newer(self) -> MemberReceived | None:
         """Return the newest valid division received that is newer than this robot's, or None.
 
-        Divisions without a part for this robot are skipped: to their authors it is absent.
+        Divisions without a part for this robot are skipped: their authors take it for absent.
         """
         most = self._most_valid()
         found = [
@@ -123,7 +123,7 @@ class DivisionNumbers:
         return (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
 
     def in_reach(self, area: ReachableArea, now: float) -> list[Robot]:
-        """Return the robots at work in an area that this robot can reach."""
+        """Return the robots at work that are within this robot's reachable area."""
         robots = []
         for name, member in self._others.known.items():
             place = anchor_cell(area.lattice, Pose2D(member.newest.x, member.newest.y))
@@ -168,7 +168,7 @@ class DivisionNumbers:
         return bool(absence) and not (absence == GONE and self._is_vouched(now))
 
     def _is_vouched(self, now: float) -> bool:
-        """Return whether the division's author is another robot at work that still sends it.
+        """Return whether the division's author is another robot, at work, that still sends it.
 
         The author may receive robots that this robot does not. If this robot left them out, the two
         would replace each other's division endlessly.

@@ -24,7 +24,7 @@ TILE_BYTES = TILE * TILE // 8
 EMPTY = bytes(TILE_BYTES)
 
 Bits = NDArray[np.uint8]
-# A place, and TILE_BYTES of bits.
+# Place of a tile, and its TILE_BYTES of bits.
 Placed = tuple["Cell", bytes]
 
 
@@ -84,7 +84,7 @@ class TileQueue(Generic[Tile]):
 
 
 class SweptQueue:
-    """Selects the tiles of the next message, see ``TileQueue``.
+    """Selects the tiles of swept cells for the next message, see ``TileQueue``.
 
     Args:
         kept: the ledger's tiles when the epoch began; None if not known.
@@ -102,7 +102,7 @@ class SweptQueue:
         return tuple((place, tile_bits(tiles[place])) for place in chosen)
 
     def kept(self, sent: Iterable[Placed]) -> tuple[Placed, ...] | None:
-        """Return which cells of tiles were swept before this epoch; None if not known."""
+        """Return which cells of sent tiles were swept before this epoch; None if not known."""
         kept = self._kept
         return None if kept is None else tuple((at, kept[at]) for at, _ in sent if at in kept)
 

@@ -25,7 +25,7 @@ SLACK_S = 3.0
 # Distance to a conflict at which a robot waits; difference up to which distances are about equal
 # [m].
 WAIT_M, NEARER_M = 1.0, 0.5
-# A robot makes way if the first OVER_M of another robot's path lead over it [m].
+# A robot makes way if the first OVER_M of another robot's path leads over it [m].
 OVER_M = 1.5
 # A robot that has stood for STANDS_S is an obstacle; a robot that is blocked or has waited for
 # PATIENCE_S makes way, or plans around the other [s].
@@ -100,25 +100,25 @@ def obstruction(
 ) -> Obstruction | None:
     """Return a robot's obstruction; None if there is none.
 
-    A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. Of two
-    robots, the first is the one whose name sorts first. It is this robot's turn if it is the first,
-    has a path, and both wait for each other. For each other robot, the first row applies whose two
-    conditions hold; "is blocked" is returned only if no other robot gives another decision.
+    A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. The first
+    of two robots is the robot whose name sorts first. It is this robot's turn if it is the first,
+    has a path, and both wait for each other. For each other robot, the first row applies in which
+    both conditions hold; "is blocked" is returned only if no robot leads to another decision.
 
     | the other robot | this robot | decision |
     |---|---|---|
-    | its path leads over this one; waits for no third robot | waits for it, or has no path; it is \
-not its turn | makes way |
-    | has stopped, at most WAIT_M / 2 ahead; waits for this one; has a path | waits for it; is the \
-second | goes on waiting |
-    | has stopped, at most WAIT_M / 2 ahead | comes nearer to it | is blocked |
-    | drives; both come too near within SLACK_S of each other | is at most WAIT_M from there, and \
+    | its path leads over this robot; waits for no third robot | waits for the other, or has no \
+path; it is not this robot's turn | makes way |
+    | has stopped, at most WAIT_M / 2 ahead; waits for this robot; has a path | comes nearer to \
+the other; waits for it; is the second | goes on waiting |
+    | has stopped, at most WAIT_M / 2 ahead | comes nearer to the other | is blocked |
+    | drives; both reach a conflict within SLACK_S of each other | is at most WAIT_M from it, and \
 NEARER_M farther than the other, or about as far and the second | waits |
-    | drives; both come too near within twice SLACK_S | is at most WAIT_M from there; waits for it \
-| goes on waiting |
+    | drives; both reach a conflict within twice SLACK_S | is at most WAIT_M from it; waits for \
+the other | goes on waiting |
 
     Args:
-        name: its name.
+        name: this robot's name.
         radius_m: radius of its disc [m].
         pace_s_m: its time per metre [s/m].
         line: points every SPACING_M from its place along its path, float64 (n, 2), n >= 1.
@@ -132,38 +132,38 @@ NEARER_M farther than the other, or about as far and the second | waits |
             continue
         theirs = spaced([(message.x, message.y), *message.ahead])
         apart_m = np.hypot(*(line[:, None] - theirs[None]).transpose(2, 0, 1))
-        is_held, is_first = waits_for == other, name < other
-        holds_it = message.waits_for == name
+        is_waiting, is_first = waits_for == other, name < other
+        other_waits = message.waits_for == name
         is_over = _is_over(apart_m, clear_m)
-        is_its_turn = is_held and holds_it and is_first and len(line) > 1
+        is_its_turn = is_waiting and other_waits and is_first and len(line) > 1
         # This robot, which waits or has no path, obstructs the other.
-        is_in_its_way = is_over and (holds_it or not message.waits_for)
-        if is_in_its_way and (is_held or len(line) == 1) and not is_its_turn:
+        is_in_its_way = is_over and (other_waits or not message.waits_for)
+        if is_in_its_way and (is_waiting or len(line) == 1) and not is_its_turn:
             return Obstruction(other, is_on_path=True)
         if message.waits_for or len(theirs) == 1 or near.stands_s > STANDS_S:
-            # A path around the other robot keeps CLEARANCE_M at the centres of cells alone, to the
-            # place where that robot stood when the path was planned: less is accepted here.
+            # A path planned around the other robot keeps CLEARANCE_M only at the centres of cells,
+            # and only to that robot's place at the time: less is accepted here.
             passes_m = clear_m - CLEARANCE_M if near.is_avoided else clear_m
             if not _comes_to(apart_m, passes_m):
                 continue
-            # A robot without a path will not move: it is not waited for.
-            if is_held and holds_it and not is_first and len(theirs) > 1:
+            # This robot does not wait for a robot without a path, as that will not move.
+            if is_waiting and other_waits and not is_first and len(theirs) > 1:
                 return Obstruction(other, is_on_path=is_over)
             blocked = blocked or Obstruction(other, is_blocked=True)
             continue
-        slack_s = 2 * SLACK_S if is_held else SLACK_S
+        slack_s = 2 * SLACK_S if is_waiting else SLACK_S
         meeting = _meeting(apart_m, clear_m, pace_s_m, near, slack_s)
         if meeting is None or meeting[0] > WAIT_M:
             continue
         sooner_m = meeting[0] - meeting[1]
         yields = sooner_m > 0.0 if abs(sooner_m) > NEARER_M else not is_first
-        if yields or is_held:
+        if yields or is_waiting:
             return Obstruction(other, is_on_path=is_over)
     return blocked
 
 
 def _is_over(apart_m: Points, clear_m: float) -> bool:
-    """Return whether the first OVER_M of the other's path lead over this robot."""
+    """Return whether the first OVER_M of the other's path leads over this robot."""
     first = apart_m[0, : int(OVER_M / SPACING_M) + 1]
     return apart_m.shape[1] > 1 and bool((first < clear_m).any())
 
@@ -179,7 +179,7 @@ def _meeting(
     apart_m: Points, clear_m: float, pace_s_m: float, near: Neighbour, slack_s: float
 ) -> tuple[float, float] | None:
     """Return where two driving robots come too near each other at about the same time: the length
-    of each one's path up to there [m], this robot's first."""
+    of each robot's path up to there [m], this robot's first."""
     mine, theirs = apart_m.shape
     at_s = np.arange(mine) * SPACING_M * pace_s_m
     there_s = np.arange(theirs) * SPACING_M * near.pace_s_m - near.age_s

@@ -61,7 +61,7 @@ class Travel:
 
     Attributes:
         cells: flat indices, int64 (n,).
-        every: 1 if these are all cells of interest, 2 for every second, and so on.
+        every: 1 if these are all cells of interest, 2 for every second cell, and so on.
     """
 
     def __init__(self, lattice: CoverageLattice, cells: NDArray[np.int64], every: int) -> None:
@@ -90,7 +90,7 @@ def cell_of(lattice: CoverageLattice, flat: int) -> Cell:
 
 
 def apart(lattice: CoverageLattice, first: Point, count: int) -> list[Point]:
-    """Return ``count`` points [m], each as far as possible from ``first`` and all earlier ones.
+    """Return ``count`` points [m], each as far as possible from ``first`` and all earlier points.
 
     Raises:
         StartBlocked: the robot does not fit at ``first``, or there is no room for ``count`` more.

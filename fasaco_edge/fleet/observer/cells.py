@@ -50,7 +50,7 @@ class Seat:
 
     @property
     def frame(self) -> Pose2D:
-        """Pose of the map frame in the fleet's."""
+        """Pose of the map frame in the fleet's frame."""
         return Pose2D(self.x, self.y, math.radians(self.deg))
 
     @property
@@ -70,7 +70,7 @@ class Seat:
         return GridGeometry(window.rows, window.cols, self.cell_m, Pose2D(x, y, lattice.yaw))
 
     def carried(self, cells: Cells, to: Seat) -> Cells:
-        """Return the cells of another seat that contain the centres of ``cells``, int64 (n, 2)."""
+        """Return the cells of ``to`` that contain the centres of ``cells``, int64 (n, 2)."""
         if to == self or not len(cells):
             return cells
         here = seen_from(self.lattice, to.lattice)
@@ -192,7 +192,7 @@ def distances(ground: NDArray[np.bool_], start: Place, most_steps: int = FAR) ->
 
     Steps lead to all four neighbours, as the observer does not know which steps a robot can make.
     """
-    # The border keeps steps from leading around an edge.
+    # The border keeps steps from leading over the end of a row into the next row.
     free = np.pad(ground, 1)
     cols = free.shape[1]
     free = free.reshape(-1)

@@ -21,7 +21,7 @@ from fasaco_edge.wire.topic_types import Topic
 from fasaco_edge.wire.topics import FLEET, MAP, POSE
 
 # Largest number of waiting samples by topic; 1 for other topics. Fleet messages repeat within a
-# second; the cells that a robot drove through need all its poses.
+# second; the cells that a robot drove through are found from all its poses.
 DEPTHS = {FLEET.name: 4, POSE.name: 256}
 # Least number of shares that the capacity is divided into.
 LEAST_SHARING = 4
@@ -37,7 +37,7 @@ class RobotSample:
 
 @dataclass(slots=True)
 class Traffic:
-    """Numbers of a robot's fleet messages, of their bytes, and of its samples of excessive size."""
+    """Counts of a robot's fleet messages, of their bytes, and of samples that were too large."""
 
     messages: int = 0
     bytes: int = 0
@@ -164,7 +164,7 @@ class FleetSubscriptions:
             self._listen(robot, topic)
 
     def ask_for_maps(self, robots: Sequence[str], now_ns: int) -> None:
-        """Ask robots for their maps, one after another; call it often.
+        """Ask robots for their maps, one after another; to be called often.
 
         Args:
             robots: their names.

@@ -1,8 +1,8 @@
 """Survey of a fleet's floor: the cells swept and left, and the owner of each cell left.
 
 The owner is the robot with the least sum of its handicap and the travel time from its seed, as in
-the robots' own division, here over the cells that the robots report as reachable. Each robot may
-send two million cells, on a lattice of its own, so the survey's size and search are bounded.
+the robots' own division. Travel leads over the cells that robots report as reachable. Each robot
+may send two million cells, on a lattice of its own, so the survey's size and search are bounded.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from fasaco_edge.wire.documents.fleet import TILE
 # Largest number of steps searched from the seeds of a division, over all robots. In very large
 # mazes, some cells get no owner.
 MOST_STEPS = 60_000
-# Largest number of cells in the rectangle around all cells, as for one robot.
+# Largest number of cells in the rectangle around all cells; the limit for one robot is the same.
 MOST_CELLS = (MOST_SPAN * TILE) ** 2
 NOBODY = -1
 
@@ -61,7 +61,7 @@ class Survey:
 
     @property
     def cell_m2(self) -> float:
-        """Area of one of its cells [m2]."""
+        """Area of a cell [m2]."""
         return 0.0 if self.geometry is None else self.geometry.resolution**2
 
     @property
@@ -108,7 +108,7 @@ def survey_of(members: ObservedFleet, now_ns: int) -> Survey:
 
 
 def _window(seat: Seat, members: ObservedFleet) -> Window | None:
-    """Return the window of all cells on a lattice; cells far from the earlier ones are left out."""
+    """Return the window of all cells on a lattice; cells far from earlier cells are left out."""
     joined = None
     for member in members:
         for tiles in (member.ground, member.swept):

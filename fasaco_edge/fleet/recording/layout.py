@@ -23,9 +23,8 @@ from fasaco_edge.recording.scene.curves import Plot
 from fasaco_edge.recording.scene.runcard import markdown_cell
 from fasaco_edge.recording.sdk import rrb
 
-# Width over height of the map view at 1280 x 720.
-MAP_ASPECT = 1.62
-TRAIL_S = 300.0
+# Width over height of the map view at 1280 x 720; time for which a track is shown [s].
+MAP_ASPECT, TRAIL_S = 1.62, 300.0
 
 
 def robot_entity(robot: str, name: str) -> str:

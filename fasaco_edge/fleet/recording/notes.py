@@ -2,7 +2,7 @@
 
 A review reads it. The notes of some seconds are written as one blob: deflated MessagePack with a
 version in it. The first blob of each part also holds all cells received before, so that the part
-can be read without the earlier ones.
+can be read without earlier parts.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ class PendingNote:
     def note(
         self, member: ObservedRobot, at_ms: int, now_ns: int, traffic: tuple[int, int]
     ) -> Note:
-        """Return what arrived since the last note."""
+        """Return a note of the data since the last note."""
         said, is_gone = member.newest, member.is_gone(now_ns)
         pose = self._pose or Pose2D(said.x, said.y)
         note = Note(
@@ -209,7 +209,7 @@ def decode_notes(blob: bytes) -> NoteBatch:
     """Return the batch of a blob.
 
     Raises:
-        ValueError: it is malformed, or of another version.
+        ValueError, msgspec.DecodeError: the blob is malformed, or of another version.
     """
     inflate = zlib.decompressobj()
     try:
@@ -223,7 +223,7 @@ def decode_notes(blob: bytes) -> NoteBatch:
         raise ValueError(f"notes of a fleet of version {version}, not {NOTES_VERSION}")
     batch = msgspec.msgpack.decode(body, type=NoteBatch)
     if any(note.robot >= len(batch.robots) for note in batch.notes):
-        raise ValueError("notes of a fleet: of a robot that is not listed")
+        raise ValueError("notes of a fleet: a note names a robot that is not listed")
     return batch
 
 

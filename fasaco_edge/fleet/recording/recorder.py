@@ -66,10 +66,10 @@ def run_fleet_recorder(
     """Record a fleet until SIGTERM or SIGINT; return the process's exit code, see ``record``.
 
     Args:
-        config: for the prefix of all keys, and the type of poses whose samples do not name it.
+        config: has the prefix of all keys, and the type of poses whose samples do not name one.
         bus_settings: how to join the bus.
         fleet: name of the fleet.
-        budget: where to write, and its limits.
+        budget: the folder to write to, and its limits.
     """
     return record(
         budget.folder, bus_settings, lambda bus: FleetRecorder(config, bus, fleet, budget)
@@ -139,8 +139,8 @@ class FleetRecorder(BusRecorder):
     def _gathered(self, arrived: list[RobotSample]) -> list[RobotSample]:
         """Return the samples to process now.
 
-        The samples of the first robots come together, sorted by the robots' names, so that robots
-        have the same colours in all recordings and pictures.
+        The samples of the first robots are processed together, sorted by the robots' names, so that
+        robots have the same colours in all recordings and pictures.
         """
         if self._gathers:
             strange = {

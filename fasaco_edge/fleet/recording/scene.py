@@ -174,7 +174,7 @@ class FleetScene:
 
     def add_division(self) -> None:
         """Draw the shares of the remaining cells, and the cells that two robots swept."""
-        # The size of the ground also limits the time of this drawing.
+        # Drawings of a large ground are rarer, as they take more time.
         size = 2 * CHUNK_BYTES + sum(member.ground.count for member in self._members) // 4
         self._layers.draw(entities.FLEET_SHARES, size, self._draw_survey, self._writer.wall_ns)
 
@@ -206,7 +206,7 @@ class FleetScene:
         self._writer.log(entities.FLEET_LOG, rr.TextLog(line, level=level))
 
     def catch_up(self) -> None:
-        """Make the drawings that are due; call it often."""
+        """Make the drawings that are due; to be called often."""
         self._layers.catch_up(self._writer.wall_ns)
 
     def describe(self, title: str) -> None:

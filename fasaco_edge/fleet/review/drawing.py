@@ -48,7 +48,7 @@ def draw_fleet_mission(
         grid: the map at the end.
         lattice: the planning grid at the end.
         tracks: driven positions (x, y) of each robot [m], by name, float64 (n, 2), n >= 1.
-        swept: reachable floor that each robot swept, in the same order, all on one raster.
+        swept: reachable floor that each robot swept, in the order of ``tracks``, all on one raster.
         unswept: reachable floor that no robot swept.
         recording: files of the fleet's recording, for the robots' colours.
         title: heading.
@@ -90,7 +90,7 @@ def _track_colour(number: int) -> palette.Colour:
     return palette.robot(number)[1]
 
 
-# Share of a robot's steps in a cell that sweep again, from which the cell counts as swept again.
+# A cell counts as swept again if more than this share of a robot's steps there sweeps again.
 MOSTLY = 0.5
 
 

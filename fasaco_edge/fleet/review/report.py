@@ -1,8 +1,7 @@
 """Review of a fleet's recording: makespan, balance, floor swept again, waiting, messages.
 
 A robot drives through floor that others have swept, or sweeps it again. From entry to exit of such
-floor, it needs as many steps as the shortest way has: these count as driving through, its further
-steps as sweeping again.
+floor, the steps of the shortest way count as driving through, all further steps as sweeping again.
 
 Durations are by the robots' own clocks, which run faster than the recorder's in a simulation. The
 recorder's clock decides which robot was first on a cell.
@@ -57,7 +56,7 @@ class FleetRobotFigures(msgspec.Struct, frozen=True):
         messages_s, kb_s: rate of its messages to the fleet [1/s], [kB/s].
         peak_kb_s: the highest rate over five seconds [kB/s].
         plans: number of plans reported.
-        plan_ms_p50, plan_ms_p99: time of a plan [ms]; null without one.
+        plan_ms_p50, plan_ms_p99: time of a plan [ms]; null without plans.
     """
 
     name: str
@@ -113,11 +112,11 @@ class FleetFigures(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FleetReview:
-    """A fleet's recording, read.
+    """Contents of a fleet's recording.
 
     Attributes:
         figures: figures of the fleet.
-        seat: seat of the lattice of all cells.
+        seat: placement of the lattice of all cells.
         ground: cells that any robot could reach, int64 (n, 2).
         tracks: the track of each robot.
     """
@@ -147,7 +146,7 @@ def find_again(tracks: Sequence[RobotTrack], ground: Cells) -> None:
     """Find the cells that robots swept after others, and the share of sweeping again in each.
 
     Args:
-        tracks: passes and swept cells of the robots; ``again`` is filled in.
+        tracks: entered and swept cells of the robots; ``again`` is filled in.
         ground: cells that the robots could reach, int64 (n, 2).
     """
     window = window_of(ground)
@@ -182,7 +181,7 @@ def _find_again_of(
 
 
 def _share_again(way: Sequence[Place], known: NDArray[np.bool_], window: Window) -> float:
-    """Return the share of a way in excess of the shortest one between its ends."""
+    """Return the share of a way in excess of the shortest way between its ends."""
     taken = sum(abs(a[0] - b[0]) + abs(a[1] - b[1]) for a, b in pairwise(way))
     start, end = ((row - window.row0, col - window.col0) for row, col in (way[0], way[-1]))
     away = distances(known, start)
@@ -221,7 +220,7 @@ def _figures(fleet: str, tracks: Sequence[RobotTrack], seat: Seat) -> FleetFigur
 def _until_last(tracks: Sequence[RobotTrack], states: Collection[str] = ()) -> float:
     """Return the time from the beginning, or the first note in ``states``, to the last note [s].
 
-    It is by the clock of the robot with the last note.
+    Times are by the clock of the robot with the last note.
     """
     at = [(note.at_ms, track) for track in tracks for note in track.notes
           if not states or note.state in states]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Cells that robots of a fleet swept, from its recording with their tracks, or from one robot's."""
+"""Cells that robots of a fleet swept, from the recording of the fleet or of one robot."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def tracks_of(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack
 def _clock(notes: Sequence[Note]) -> RobotClock:
     """Return the clock of a robot, by the stamps of its poses if it is simulated.
 
-    Before the first stamp and after the last one, it runs at the configured time scale.
+    Before the first stamp and after the last stamp, the clock runs at the configured time scale.
     """
     stamped = [note for note in notes if note.stamp_ms]
     scale = stamped[-1].time_scale if stamped else 1.0

@@ -148,7 +148,7 @@ class FleetFeed(BusJoining):
         self._subscriptions: FleetSubscriptions | None = None
 
     def attend(self, robots: Collection[str]) -> None:
-        """Subscribe to the robots of these names; call it often."""
+        """Subscribe to the robots with these names; to be called often."""
         if (subscriptions := self._subscriptions) is not None:
             for robot in set(robots) - subscriptions.robots:
                 subscriptions.subscribe(robot)
@@ -165,7 +165,7 @@ def _stamped(topic: str, sample: Sample) -> Arrival:
 
 
 # Longest wait for the other robots after the first message [s]. A robot sends a message per second:
-# within SENT_S [s] each robot has sent one.
+# within SENT_S [s] each robot has sent a message.
 MOST_WAIT_S, SENT_S = 4.0, 1.3
 # Period of printing JSON [s].
 EVERY_S = 1.0
@@ -235,7 +235,7 @@ class FleetWatch(Watched):
         return len(self.view.members) > 0
 
     def is_whole(self) -> bool:
-        """Return whether all robots have had time for a message."""
+        """Return whether all robots have had time for a message, and the survey includes them."""
         view = self.view
         is_complete = steady_now() - self._known_at > SENT_S
         return is_complete and view.floor.robots >= set(view.names())
@@ -257,5 +257,5 @@ def _no_robot(keys: Keys, view: FleetView) -> NobodyAnswersError:
     return NobodyAnswersError(
         f"no robot of a fleet {one_line(view.fleet)!r} answers",
         hint=f"there are robots of these fleets: {', '.join(sorted(view.others))}; "
-        "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
+        "`fleet: {name: ...}` in the configuration of a robot makes it a member",
     )

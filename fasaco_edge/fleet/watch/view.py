@@ -25,9 +25,9 @@ from fasaco_edge.wire.reasons import plain
 NOTED_EVERY_S = 1.0
 # Least time between two surveys of the floor: in [s], and as a multiple of a survey's duration.
 LEAST_AGE_S, LEAST_REST = 1.0, 10.0
-# A robot that is silent here is named if others received a message from it within this time [s].
+# A robot without messages to this watch is named if others received one within this time [s].
 RECENT_S = 600.0
-# Number of robots and topics whose faults are counted separately; of other fleets that are named.
+# Number of robots and topics whose faults are counted separately; number of other fleets named.
 MOST_FAULTS, MOST_FLEETS = 256, 32
 # States of a robot that does something for its mission.
 AT_WORK = states_of(Activity.DRIVING)
@@ -65,18 +65,18 @@ class FleetRobot:
 
     @property
     def is_at_work(self) -> bool:
-        """Whether it does something for its mission."""
+        """Whether the robot does something for its mission."""
         return self.silent_s is None and self.state in AT_WORK
 
     @property
     def doing(self) -> str:
-        """Its activity in a few words."""
+        """The robot's activity in a few words."""
         if self.silent_s is not None:
             return "gone"
         return f"waits for {self.waits_for}" if self.waits_for else self.state or "no state"
 
     def document(self) -> dict[str, object]:
-        """Return it as ``--json`` prints it."""
+        """Return the robot as ``--json`` prints it."""
         said = self.member.newest
         x, y = self.member.placed(said.x, said.y)
         return {
@@ -145,7 +145,7 @@ class FleetView:
             self._note_often(robot, arrival.topic, text, 1e-9 * arrival.wall_ns)
 
     def tick(self, now: float) -> None:
-        """Note changes up to ``now``, time since the epoch [s]; call it often."""
+        """Note changes up to ``now``, time since the epoch [s]; to be called often."""
         now_ns = int(1e9 * now)
         divider = self.members.dividing(now_ns)
         self._look_at_floor(divider, now_ns)

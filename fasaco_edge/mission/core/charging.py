@@ -22,7 +22,7 @@ from fasaco_edge.mission.work.order_state import AT_HOME, NO_ORDER
 from fasaco_edge.mission.work.sequencer import Sequencer
 from fasaco_edge.text import percent
 
-# A level that differs from the last accepted one by more than JUMP must be repeated for HOLD_S [s].
+# A level that differs from the accepted level by more than JUMP must be repeated for HOLD_S [s].
 JUMP, HOLD_S = 0.05, 5.0
 # The first level is accepted if a level HOLD_S later differs by this much or less.
 COARSE = 0.2
@@ -30,14 +30,14 @@ COARSE = 0.2
 STEP, LEAST_S = 0.01, 10.0
 # The drain is the median over the NEWEST stretches; at least FEWEST are needed.
 NEWEST, FEWEST = 15, 3
-# Least difference between the level at which the robot turns back and the one at which it resumes.
+# Least difference between the levels at which the robot turns back and at which it resumes.
 HYSTERESIS = 0.1
-# The estimate of the rest assumes this many unknown cells beyond each cell at the map's border.
+# The estimated rest of the order has this many unknown cells beyond each cell at the map's border.
 BEYOND_CELLS = 20
 # A robot near its dock may go to charge at a level that is EARLY above the level at which it turns
 # back. PLACES_AHEAD places on its path ahead are compared.
 EARLY, PLACES_AHEAD = 0.2, 8
-# Limit on the cells of a lattice on which these places are compared: larger ones take too long.
+# Limit on the cells of a lattice on which these places are compared: larger lattices take too long.
 MOST_CELLS = 200_000
 # The battery is full if its level has risen by less than RISE in FULL_AFTER_S [s].
 RISE, FULL_AFTER_S = 0.005, 1800.0
@@ -47,7 +47,7 @@ class BatteryGauge:
     """Filter over battery messages: accepts levels, rejects outliers, measures the drain.
 
     Attributes:
-        level: accepted charge from 0 to 1; None before one is accepted.
+        level: accepted charge from 0 to 1; None before a level is accepted.
         power: state of the power supply, as in the message; "" before the first one.
         received_at: arrival time of the last level, accepted or not [s].
     """
@@ -76,10 +76,7 @@ class BatteryGauge:
         return median(self._drains) if len(self._drains) >= FEWEST else None
 
     def silent_s(self, now: float) -> float:
-        """Return the time since the last accepted level; until the first, since ``start_timeout``.
-
-        In seconds; 0 before both.
-        """
+        """Return the time since the last accepted level or, at first, ``start_timeout`` [s]."""
         return 0.0 if self._accepted_at is None else now - self._accepted_at
 
     def why_silent(self, since: float) -> str:
@@ -134,7 +131,7 @@ class Charging:
     orders: Sequencer
     route: Route
     gauge: BatteryGauge = field(default_factory=BatteryGauge)
-    # Time to the dock [s]; time for the rest of the order [s], None if unknown; their age.
+    # Time to the dock [s]; time for the rest of the order [s], None if unknown; age of both.
     _to_dock_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked: Lapse = field(init=False)
@@ -231,7 +228,7 @@ class Charging:
 
     @property
     def goes_on_at(self) -> float:
-        """The level at which it resumes: ``enough``, or less if the rest needs less."""
+        """The level at which the robot resumes: ``enough``, or less if the order needs less."""
         assert self.policy is not None
         policy, drain = self.policy, self.gauge.drain_per_s
         if drain is None or self._rest_s is None:
@@ -280,7 +277,7 @@ class Charging:
     def _is_best_to_leave_here(self) -> bool:
         """Return whether charging is due soon, and this is the best place to leave the path.
 
-        Places on the path up to the level of turning back are compared. The best one has the
+        Places on the path up to the level of turning back are compared. The best place has the
         shortest way to the dock, relative to the charge used. The result is False if the path ends
         before that level, as it may be the last path.
         """

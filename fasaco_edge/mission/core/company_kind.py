@@ -1,4 +1,4 @@
-"""Kind of company: builds the parts of a mission that handle other robots, given what they need."""
+"""Kind of company: factory for the parts of a mission that handle other robots."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 class CompanyKind:
-    """Factory for the parts of a mission that handle other robots; here, for a single robot."""
+    """The factory for a single robot; a fleet has its own."""
 
     def cells(self) -> OthersCells:
         """Return the cells that others have swept."""
         return OthersCells()
 
     def company(self, config: MissionConfig, map_state: MapState, ledger: MissionLedger) -> Company:
-        """Return the other robots."""
+        """Return the mission's interface to the other robots."""
         return Company()
 
     def waiting(

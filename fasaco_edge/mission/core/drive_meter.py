@@ -24,7 +24,7 @@ BESIDE_S = 1.5
 TURNS_RAD_S, OVER_S = 0.12, 0.5
 # Poses of one track are at most GAP_S apart; poses closer than LEAST_S are ignored [s].
 GAP_S, LEAST_S = 1.0, 0.05
-# Time for which poses are kept [s]. No turn takes longer: such a robot waits, or is lost.
+# Time for which poses are kept [s]. A robot that takes longer for a turn waits, or is lost.
 KEPT_S = 40.0
 # Largest deviation from straight driving at constant speed, as a share of the distance driven in
 # ``BESIDE_S``. The noise of a standing robot's poses exceeds it.

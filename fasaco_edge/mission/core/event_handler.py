@@ -1,4 +1,4 @@
-"""Event handler: application of events to the mission's state, before it decides."""
+"""Event handler: application of events to the mission's state, before the mission decides."""
 
 from __future__ import annotations
 
@@ -43,7 +43,6 @@ class EventHandler:
         self.drive, self.battery = parts.lasting.drive, parts.lasting.battery
         self.rooms = parts.lasting.rooms
         self._now = 0.0
-        # Results of the events of one step.
         self._path: PathUpdate | None = None
         self._faults: list[FasacoError] = []
         self._answers: list[Answer] = []
@@ -154,7 +153,7 @@ class EventHandler:
         self._change_building(self.ledger.check(free, frame) if shows_floor else None)
 
     def _compare_buildings(self) -> Pose2D | None:
-        """Compare the newest map with earlier ones; return the robot's pose on the earlier ones."""
+        """Compare the newest map with earlier ones; return the robot's pose on the earlier maps."""
         if self.map.ground.plain is None or self.map.ground.free is None:
             return None
         pose = None if self.map.pose is None else self.map.pose.pose
@@ -166,7 +165,7 @@ class EventHandler:
         return self.map.building.receive_map(plain, pose, self._now, contradicts)
 
     def _settle_frame(self) -> None:
-        """Assign the map's frame to places and orders without one; drop those of other frames."""
+        """Assign the map's frame to places and orders without one; drop any in other frames."""
         grid, frames = self.map.grid, self.map.frames
         if grid is None or grid.frame != frames.active or not frames.is_settled:
             return
@@ -194,7 +193,7 @@ class EventHandler:
         self._change_building(misfit)
 
     def _change_building(self, misfit: LedgerMismatchError | None) -> None:
-        """Continue on a new map; drop the places of the previous building if it shows another."""
+        """Continue on a new map; drop the places if the map shows another building."""
         if misfit is not None:
             self.map.building.accept_building(self._now)
             self.map.places.leave_building(self.ledger.current.frame)

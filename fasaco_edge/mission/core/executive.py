@@ -28,7 +28,7 @@ class Executive:
 
     @property
     def rules(self) -> tuple[Callable[[], Doing | None], ...]:
-        """The rules, in order; each returns the mission's activity, or None to let the next one
+        """The rules, in order; each returns the mission's activity, or None to let the next rule
         decide."""
         return (
             self._charge_in_time,
@@ -55,7 +55,7 @@ class Executive:
         self.troubles = Troubles(parts)
         self._state, self._reason = State.WAITING_FOR_MAP, "no map yet"
         # State of this step: the time [s], the robot's cell once known, and the path made so far,
-        # which is published unless a rule returns another one.
+        # which is published unless a rule returns another path.
         self._now = 0.0
         self._cell: Cell = 0, 0
         self._update: PathUpdate | None = None
@@ -82,7 +82,7 @@ class Executive:
         return State.RETURNING if self._state is State.DONE and makes_way else self._state
 
     def decide(self, now: float) -> Decision:
-        """Return the decision at ``now`` [s]: that of the first rule that returns an activity."""
+        """Return the decision at ``now`` [s], by the first rule that returns an activity."""
         self._now, self._update = now, None
         self.way_out.forget_why()
         doing = next(doing for rule in self.rules if (doing := rule()) is not None)
@@ -102,7 +102,7 @@ class Executive:
             orders.set_state(replace(orders.order_state, errand="charge"))
 
     def _end_in_time(self) -> None:
-        """End the order if the robot has to turn home to be there in time."""
+        """End the order if the robot has to leave now to be at home in time."""
         is_due = self.time_limit.is_due(self._now)
         may_work_s = self.time_limit.may_work_s(self._now)
         self.orders.scope.worth.allow(min(may_work_s, self.charging.may_work_s))
@@ -172,7 +172,7 @@ class Executive:
         return None
 
     def _find_place(self) -> Doing | None:
-        """Find the robot's cell; if it is outside of all cells, lead it back to the nearest one."""
+        """Find the robot's cell; lead a robot outside of all cells back to the nearest cell."""
         route, cell = self.route, self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()
@@ -192,12 +192,12 @@ class Executive:
         return None
 
     def _wait_for_room(self) -> Doing | None:
-        """Wait for a room that the order names, after all its other zones."""
+        """Wait for a room that the order names, once all other zones are done."""
         name = self.orders.order_state.waits_for
         return self._work.wait_for_room(name, self._now) if name else None
 
     def _judge_path(self) -> None:
-        """Ask for a plan if the path no longer serves the order."""
+        """Request a plan if the path no longer serves the order."""
         cell, now = self._cell, self._now
         if self._state in DRIVING:
             self._checks.check(cell, now, is_covering=self._state is State.COVERING)
@@ -228,7 +228,7 @@ class Executive:
         return None
 
     def _drive(self) -> Doing:
-        """Drive on; publish the path again to a robot that stands; use spare time."""
+        """Drive on; publish the path again to a robot that stands; request better paths."""
         route, now, update = self.route, self._now, self._update
         state, reason = self._state, self._reason
         if route.requests.pending is not None and not len(route.path.cells):

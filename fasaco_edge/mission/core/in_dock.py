@@ -1,4 +1,4 @@
-"""In dock: whether the robot is in its dock, and whether its battery charges there.
+"""Docking state: whether the robot is in its dock, and whether its battery charges there.
 
 No single message decides: levels rise slowly and in coarse steps, some batteries report the wrong
 power supply status, and a bad contact is intermittent.
@@ -30,10 +30,10 @@ class InDock:
     def holds(self, *, is_charging: bool) -> bool:
         """Return whether the robot is in its dock.
 
-        The dock may be in a cell that is not coverable, to which the base has driven by itself.
+        The dock may be in a cell that is not coverable: the base drives the last part by itself.
 
         Args:
-            is_charging: whether the mission already counts it as docked.
+            is_charging: whether the mission already counts the robot as docked.
         """
         place, stamped = self.map.places.place("charge"), self.map.pose
         if place is None or stamped is None:
@@ -54,8 +54,8 @@ class InDock:
         return math.hypot(pose.x - stand.x, pose.y - stand.y) <= reach_m
 
 
-# The level of a docked battery has to rise within FLAT_S [s], as most charge by 1 % in less than
-# ten minutes; without a report of charging it has to rise within PATIENCE_S [s].
+# The level of a docked battery has to rise within FLAT_S [s], as most batteries gain 1 % in less
+# than ten minutes; without a report of charging, within PATIENCE_S [s].
 PATIENCE_S, FLAT_S = 45.0, 600.0
 # A battery does not charge if its level falls by more than this. A fall of 1 % is noise: one step
 # of a coarse gauge.
@@ -74,7 +74,7 @@ class DockCurrent:
         # The last extreme of the level: the highest while it rises, the lowest while it falls.
         self._extreme: float | None = None
         self._falls = False
-        # The level from which it falls.
+        # The highest level before the present fall.
         self._from = 0.0
         self._rose_at: float | None = None
 

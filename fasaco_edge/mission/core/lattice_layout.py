@@ -29,7 +29,7 @@ from fasaco_edge.planners.passes import Laid, lane_and_tool_m
 
 # Evidence required: length of parallel walls [m], and their share of all walls.
 LEAST_WALL_M, LEAST_SHARE = 5.0, 0.45
-# Two estimates must agree within SAME_DEG [deg]; one suffices from PLENTY_M of walls on [m].
+# Two estimates must agree within SAME_DEG [deg]; one estimate with PLENTY_M of walls suffices [m].
 SAME_DEG, PLENTY_M = 1.5, 15.0
 # The least rotation that is worth a stop of the robot [deg].
 LEAST_ROTATION_DEG = 2.0
@@ -52,7 +52,7 @@ class WallWatch:
 
     @property
     def is_over(self) -> bool:
-        """Whether it has decided or given up."""
+        """Whether the watch has decided or given up."""
         return self._looks >= MOST_LOOKS
 
     def stop(self) -> None:
@@ -136,7 +136,7 @@ class LatticeLayout:
         """Keep angle and edge of a ledger's cells; return whether that changes the layout.
 
         The ledger is from before a restart. Its edge of cells is kept only if the present pass has
-        the same.
+        the same edge.
         """
         was, deg = (self.deg, self.cell_m), before.lattice_deg
         if deg == lay.angle_deg:
@@ -198,8 +198,8 @@ class LatticeLayout:
         return True
 
     def rotates_back_for(self, maps: Iterable[OccupancyGrid]) -> str:
-        """Change the angle to 0, or the edge to the usual one, if one of the maps does not fit
-        otherwise; return why, "" for no change."""
+        """Change the angle to 0, or the edge to the usual edge, if a map does not fit otherwise;
+        return why, "" for no change."""
         is_usual = (self.deg, self.cell_m) == (self._usual_deg, self._usual_cell_m)
         if is_usual and (self._is_given or not self.deg):
             return ""

@@ -53,7 +53,7 @@ class LatticeRotation:
     deg: float = 0.0
 
     def config(self, config: MissionConfig) -> MissionConfig:
-        """Return a mission's configuration in the mission's frame; ``given`` stays in the map's."""
+        """Return a mission's configuration in the mission's frame; ``given`` stays as is."""
         policy = config.policy
         if self.deg:
             polygons = policy.keep_out + mask_polygons(policy.keep_out_mask)
@@ -127,7 +127,7 @@ class LatticeRotation:
         return self.geometry(GridGeometry.of_cells(window, cell_m))
 
     def geometry(self, geometry: GridGeometry) -> GridGeometry:
-        """Return a placement of the mission in the map frame."""
+        """Return the placement of a grid of the mission in the map frame."""
         return rotated_geometry(geometry, self.deg) if self.deg else geometry
 
     def centre(self, cell: Cell, cell_m: float) -> Point:

@@ -1,7 +1,7 @@
 """Mission: events in, decisions out; owner of map, ledger, order and route.
 
-``step(events, now)`` is the whole interface. It opens no session, reads no clock and touches no
-file, so a mission can be tested and repeated with plain values.
+``step(events, now)`` runs a mission. This opens no session, reads no clock and touches no file, so
+missions can be tested and repeated with plain values.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class Mission:
             now: time of any monotonic clock [s].
         """
         events = list(events)
-        begun = self._make_room(events, now)
+        begun = self._fit_map(events, now)
         happened = self._align(self._handle(events, now), now)
         happened = self._find_rooms(happened, now)
         decided = self._executive.decide(now)
@@ -214,10 +214,10 @@ class Mission:
         return self._handler.handle(map(self.rotation.event, events), now)
 
     def _align(self, happened: Decision, now: float) -> Decision:
-        """Lay other cells if the pass or the walls require them; return the combined decision."""
+        """Change the lattice if the pass or the walls require it; return the combined decision."""
         state, grid, pose = self.order_state, self.grid, self.pose
         self._layout.receive_faults(happened.faults)
-        # Keep the cells in an errand (the kept path needs them), and while the building is in
+        # Keep the cells during an errand, for the path set aside, and while the building is in
         # doubt.
         if state.errand or self.is_in_doubt or grid is None or pose is None:
             return happened
@@ -226,8 +226,8 @@ class Mission:
         stop = self._lay_anew(why, now) if why else None
         return replace(happened, path=stop or happened.path)
 
-    def _make_room(self, events: Iterable[Event], now: float) -> PathUpdate | None:
-        """Lay the usual cells for a map that does not fit otherwise; return the path, if any."""
+    def _fit_map(self, events: Iterable[Event], now: float) -> PathUpdate | None:
+        """Use the usual lattice for a map that does not fit otherwise; return the path, if any."""
         maps = (event.grid for event in events if isinstance(event, MapReceived))
         why = self._layout.rotates_back_for(maps)
         return self._lay_anew(why, now) if why else None
@@ -262,7 +262,7 @@ class Mission:
     def idle_places(self, now: float) -> str:
         """Return which keep-outs and places have no effect on the map at ``now`` [s]; "" if none.
 
-        It is used for reports only, not for decisions.
+        For reports only, not for decisions.
         """
         if self.grid is None:
             return ""
@@ -296,7 +296,7 @@ class Mission:
 
     @property
     def grid(self) -> OccupancyGrid | None:
-        """The newest map; None before there is one."""
+        """The newest map; None before the first map."""
         if self.map.given is not self._laid_grid:
             given = self.map.given
             self._laid_grid, self._given_grid = given, self.rotation.grid(given)
@@ -304,12 +304,12 @@ class Mission:
 
     @property
     def pose(self) -> StampedPose | None:
-        """The newest pose; None before there is one."""
+        """The newest pose; None before the first pose."""
         return self.rotation.pose(self.map.pose)
 
     @property
     def lattice(self) -> CoverageLattice | None:
-        """The lattice over the newest map, in its own frame; None before there is a map."""
+        """The lattice over the newest map, in the mission's frame; None before there is a map."""
         return self.map.ground.lattice
 
     @property

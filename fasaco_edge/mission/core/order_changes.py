@@ -56,7 +56,7 @@ class OrderChanges:
         return self.config.lattice_deg or 0.0
 
     def begin_order(self, order: OrderState) -> None:
-        """Begin another order; or end the present one, if the new state has none."""
+        """Begin another order, or end the present order if the new state has no order."""
         self.route.abandon()
         self.motion.forget_order()
         self._keep_out(order)
@@ -163,7 +163,7 @@ class OrderChanges:
         self._followed = book.version, order
 
     def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:
-        """Apply changed keep-outs to the same order; stop a robot inside one of them."""
+        """Apply changed keep-outs to the same order; stop a robot inside a keep-out."""
         before = self.map.area
         self._keep_out(order)
         self.route.requests.forget_failure()

@@ -52,8 +52,8 @@ class OrderWork:
     def _go_on_elsewhere(self, cell: Cell, now: float) -> Doing | None:
         """Find other work for a robot without reachable cells to cover; None to plan again.
 
-        In this order: a way out if it is shut in, a viewpoint, a wait for others, floor that the
-        line has missed, giving up unreachable cells, the next stage of the order.
+        In this order: a way out if the robot is shut in, a viewpoint, a wait for others, floor that
+        the line has missed, giving up unreachable cells, the next stage of the order.
         """
         route, orders, area = self.route, self.orders, self.map.area
         if area is not None and (why := self.way_out.why_shut_in(area)):
@@ -99,7 +99,7 @@ class OrderWork:
         return Doing(State.BLOCKED, reason, self.route.stop(reason, now))
 
     def share(self, cell: Cell, now: float, *, at_once: bool = False) -> str:
-        """Divide the rest among the robots if due; return why a plan is wanted, or ""."""
+        """Divide the remaining cells if due; return why a plan is wanted, or ""."""
         if self.orders.order_state.stage is Stage.RETURNING:
             return ""
         return self.company.share(self.orders.cells.open_cells, cell, now, at_once=at_once)

@@ -29,11 +29,11 @@ from fasaco_edge.mission.work.sequencer import Sequencer
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Lasting:
-    """The parts that stay when cells are laid anew.
+    """The parts that stay when the lattice changes.
 
     Attributes:
         drive: the measured driving.
-        battery: the charge.
+        battery: the battery's level and drain.
         rooms: the rooms of the building, in the map frame.
     """
 
@@ -50,19 +50,19 @@ class MissionParts:
         map: the newest map, the robot's cell, the reachable cells.
         ledger: the cells covered by this robot and others, and the swept floor.
         monitor: which maps and poses are in use, and which are missing.
-        orders: the order, and what is left of it.
+        orders: the order, and the cells left.
         route: the published path and the pending plan.
         line: the line over the path.
         trail: the trail from which ants start.
-        motion: what lay on the map before it moved.
+        motion: moves coverage, trail and path with the map after a loop closure.
         company: the other robots; ``giving_way``: which of them this robot waits for.
         charging: when to charge; ``dock``: whether the robot is in its dock.
         time_limit: when the order has to end.
         way_out: the way back for a robot that the map has shut in.
-        blocked: what the follower reports in the way.
+        blocked: the follower's report of what blocks the robot.
         standing: how long the robot has not moved.
         changes: orders and commands that change all of these.
-        lasting: the parts that stay when cells are laid anew.
+        lasting: the parts that stay when the lattice changes.
         room_cells: the room of each cell.
     """
 

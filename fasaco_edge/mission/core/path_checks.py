@@ -14,7 +14,7 @@ FAR_APART = "poses are too far apart"
 
 
 class PathChecks:
-    """Wants a new plan if the path no longer serves the driving robot.
+    """Requests a new plan if the path no longer serves the driving robot.
 
     Nothing is checked while a plan is wanted or being made.
     """
@@ -25,7 +25,7 @@ class PathChecks:
         self._company = parts.company
         self._orders.describe_floor_by(self._sum_up)
         self._worth_at = self._timed_at = float("-inf")
-        # Number of covered cells and its time [s], while poses are too far apart.
+        # Number of covered cells, and when it was counted [s], while poses are too far apart.
         self._progress: tuple[int, float] | None = None
 
     def check(self, cell: Cell, now: float, *, is_covering: bool) -> None:
@@ -37,7 +37,7 @@ class PathChecks:
             check(cell, now)
 
     def _check_deviation(self, cell: Cell, now: float) -> None:
-        """Ask for a new plan for a robot that is off its path or at its end."""
+        """Ask for a new plan for a robot that is off its path or at the path's end."""
         route, monitor, path = self._route, self._monitor, self._route.path
         waited = self._standing.has_waited
         if self._drives_in_vain(now):
@@ -46,7 +46,7 @@ class PathChecks:
         if monitor.doubt:
             doubted = route.published_at < monitor.doubt_since
             if doubted and list(cell) in path.ahead[:2].tolist():
-                monitor.clear_doubt()  # the pose only flickered
+                monitor.clear_doubt()  # the pose was wrong for a moment
             elif waited and now - monitor.doubt_since >= PATIENCE_S:
                 route.requests.want(monitor.doubt)
             return
@@ -63,7 +63,7 @@ class PathChecks:
 
     def _end_path(self, now: float, why: str = "") -> None:
         if self._orders.scope.is_first_done:
-            self._route.requests.want("what comes first is done: the rest")
+            self._route.requests.want("floor planned first is done: the rest")
         elif self._orders.part.record_path_end(why):
             self._orders.advance(now)
         else:
@@ -99,12 +99,12 @@ class PathChecks:
             return
         self._worth_at = now
         if not self._line.left.is_worth_driving and not self._orders.scope.is_any_planned_left:
-            route.requests.want("others have swept what lay ahead")
+            route.requests.want("others have swept the floor ahead")
 
     def _check_room(self, cell: Cell, _: float) -> None:
         """Ask for a new plan if new rooms show that the robot has another room to finish first."""
         if self._orders.scope.is_in_other_room(cell):
-            self._route.requests.want("rooms have changed: another one first")
+            self._route.requests.want("rooms have changed: another room first")
 
     def _check_time(self, _: Cell, now: float) -> None:
         """Ask for a new plan with the most worthwhile floor first if time or battery do not suffice

@@ -36,7 +36,7 @@ class PublishedPath:
 
     Attributes:
         frame: the map frame.
-        reason: why it replaces the previous one.
+        reason: why it replaces the previous path.
         revision: counts the paths of a mission, from 1, including the empty path at its end; 0 if
             there was no mission.
         xy: float64 (n, 2), x, y [m]; n = 0 stops the robot.
@@ -114,7 +114,7 @@ class PathExit:
 
     @property
     def newest(self) -> PublishedPath | None:
-        """The path to send, or else the last one sent; None before the first."""
+        """The path to send, or else the last path sent; None before the first."""
         return self._due or self._sent
 
     def follow(self, mission: Mission, update: PathUpdate | None) -> None:
@@ -131,7 +131,7 @@ class PathExit:
             self._due = newest.withdrawn(reason)
 
     def void(self, reason: str, frame: str) -> None:
-        """Replace any path by an empty one, even one of another daemon or an earlier process."""
+        """Replace any path by an empty one, even a path of another daemon or an earlier process."""
         self.withdraw(reason)
         self._due = self._due or PublishedPath(frame, reason)
 
@@ -142,11 +142,11 @@ class PathExit:
     def send(self, publish: Callable[[PublishedPath], bool]) -> PublishedPath | None:
         """Send the path that is due, and return it; None if none is due, or if it cannot be sent.
 
-        If a path cannot be sent, an empty one is due: the robot must not follow the previous path.
-        Each call tries again until a path is sent.
+        If a path cannot be sent, an empty path is sent instead: the robot must not follow the
+        previous path. Each call tries again until a path is sent.
 
         Args:
-            publish: sends a path; returns whether it did.
+            publish: sends a path; returns whether that succeeded.
         """
         if self._due is None:
             return None

@@ -16,8 +16,8 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.path.route import Route
 
-# Minimum time between new plans for a robot that left its path or stands still at its end: a
-# flickering pose must not keep the planner busy.
+# Minimum time between new plans for a robot that left its path or stands still at its end: poses
+# that jump to and fro must not keep the planner busy.
 PATIENCE_S = 1.0
 # A robot that stands on its path, within STANDING_M [m] for STANDING_S [s], gets the path again:
 # the follower may have lost it, or stopped for an obstacle that is gone. A shorter time would
@@ -28,25 +28,23 @@ STANDING_S, STANDING_M = 30.0, 0.1
 TRIES = 2
 # A robot counts as turning if its heading has changed this much lately [rad].
 TURNS_RAD = 0.1
-# A robot that stands beside its path gets a new one after this time: an obstacle may separate it
+# A robot that stands beside its path gets a new path after this time: an obstacle may separate it
 # from the path.
 BESIDE_S = 2.0
 
 
 class Standing:
-    """Measures how long the robot stands."""
-
     def __init__(self, map_state: MapState, route: Route) -> None:
         self._map, self._route = map_state, route
         self._now = 0.0
         self._cell: Cell | None = None
         self._entered_at = 0.0
-        # The robot's place, and since when it has had a path there, by our clock, and by the
-        # robot's [ns]. A time without a path is added to it.
+        # The robot's place, and the start of its stay there, by our clock and by the robot's [ns].
+        # A time without a path moves the start forward.
         self._stay, self._since_ns = Stay(STANDING_M), 0
-        # The last time that it had a path to drive there, by both clocks.
+        # The last time that the robot had a path to drive there, by both clocks.
         self._had_path = 0.0, 0
-        # Number of times that it got its path again there.
+        # Number of times that the robot got its path again there.
         self._tries = 0
         # The robot's yaw when it last turned [rad], and the time of that turn.
         self._yaw, self._turned_at = 0.0, -math.inf
@@ -150,7 +148,7 @@ class Standing:
     def _in_place_s(self) -> float:
         """Return how long the robot has stood in one place with a path to drive.
 
-        It is the longer of the times by our clock and by the robot's, as stamps may stand still.
+        The longer of the times by our clock and by the robot's counts, as stamps may stand still.
         """
         assert self._map.pose is not None
         theirs_s = (self._map.pose.stamp_ns - self._since_ns) * 1e-9

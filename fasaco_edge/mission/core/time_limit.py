@@ -36,7 +36,7 @@ class Lapse:
 
     @property
     def has_started(self) -> bool:
-        """Whether it was started."""
+        """Whether the time was started."""
         return self._since is not None
 
     def start(self, now: float) -> None:
@@ -73,7 +73,7 @@ def seconds_back(
 
 @dataclass(slots=True, eq=False)
 class TimeLimit:
-    """Says when the robot has to turn home to be there in time; times ``now`` are [s]."""
+    """Decides when the robot has to drive home to be there in time; times ``now`` are [s]."""
 
     config: MissionConfig
     map: MapState
@@ -102,14 +102,14 @@ class TimeLimit:
         return max(60.0 * self.minutes - state.spent_s, 0.0)
 
     def may_work_s(self, now: float) -> float:
-        """Return how long the robot may work from here until it has to turn home [s]."""
+        """Return how long the robot may work from here until it has to drive home [s]."""
         left_s = self.left_s
         if left_s is None:
             return float("inf")
         return left_s - self._looked.seconds(now) - LINE_FACTOR * self._to_home_s
 
     def is_due(self, now: float) -> bool:
-        """Return whether the robot has to turn home at ``now``; to be called in each step."""
+        """Return whether the robot has to drive home at ``now``; to be called in each step."""
         orders, state = self.orders, self.orders.order_state
         if not self.minutes or not state.has_begun or state.stage is Stage.OVER:
             self._looked = Lapse(self.map)

@@ -23,13 +23,13 @@ IMPOSSIBLE_S = 20.0
 
 # States of a robot that drives, or soon will.
 DRIVING = states_of(Activity.DRIVING) - TROUBLED
-# States of a mission under way. In the others the robot may be switched off.
+# States of a mission under way. In other states the robot may be switched off.
 UNDER_WAY = states_of(Activity.STARTING)
 
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """What is wrong.
+    """A fault of the robot or an input.
 
     Attributes:
         code: one of ``wire.documents.status.TROUBLES``.
@@ -62,7 +62,7 @@ class Troubles:
     """Finds the troubles of a mission.
 
     Attributes:
-        found: by the last ``update``, in the order of ``RULES``.
+        found: the troubles at the last ``update``, in the order of ``RULES``.
     """
 
     def __init__(self, parts: MissionParts) -> None:

@@ -33,8 +33,8 @@ TRACK_M, SPACING_M = 40.0, 0.05
 # On the way out the robot may come this much nearer to walls [pixels of the map]: a wall may be a
 # pixel thicker on the map than it is, and the pose off by half a pixel.
 SQUEEZE_PX = 1.5
-# A robot that moves less than STANDING_M [m] on its way out in STANDING_S [s] cannot drive it. It
-# tries again after that time, which doubles with each failure.
+# A robot that moves less than STANDING_M [m] on its way out in STANDING_S [s] cannot drive it. The
+# robot tries again after that time, which doubles with each failure.
 STANDING_M, STANDING_S = 0.1, 15.0
 # The way out leads this many points of the track past the first place where the robot can continue.
 INTO_POINTS = 4
@@ -143,7 +143,7 @@ class WayOut:
     def _find(self, leads_on: Callable[[ReachableArea], bool]) -> NDArray[np.float64]:
         """Return the way from the robot back to where it can continue, float64 (n, 2): x, y [m].
 
-        It is empty, (0, 2), if there is none, or if only cells are counted.
+        The way is empty, (0, 2), if there is none, or no map of the floor.
         """
         floor, lattice, stamped = self._map.ground.floor, self._map.ground.lattice, self._map.pose
         if floor is None or lattice is None or stamped is None or self._map.grid is None:

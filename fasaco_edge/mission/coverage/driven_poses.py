@@ -1,10 +1,10 @@
-"""Driven poses: the poses that the robot can have driven to.
+"""Driven poses: the poses that the robot could have driven to.
 
-Swept floor uses only poses that the robot can have driven to. Localisation sometimes errs by more
+Swept floor uses only poses that the robot could have driven to. Localisation sometimes errs by more
 than its noise: one pose lies beside the track, and the next pose lies on it again. A pose farther
-away than the robot can have driven since the previous pose is held until the next pose. If the
-robot can have driven directly to the next pose, the held pose was an error. Otherwise the held pose
-counts, and the track to it is unknown.
+away than the robot could have driven since the previous pose is held until the next pose. If the
+robot could have driven directly to the next pose, the held pose was an error. Otherwise the held
+pose counts, and the track to it is unknown.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose
 # A base drives up to SPEED_MARGIN times as fast as configured. The track between two poses is known
 # if they are at most LONGEST_S apart [s].
 SPEED_MARGIN, LONGEST_S = 1.2, 3.0
-# By noise two poses may be this much farther apart than the distance driven [cells].
+# Because of noise, two poses may be this much farther apart than the distance driven [cells].
 NOISE_CELLS = 0.5
 
 
@@ -54,12 +54,12 @@ class DrivenPoses:
         self._sure = self._held = None
 
     def farthest_m(self, before: StampedPose, after: StampedPose) -> float:
-        """Return how far the robot can have driven between two poses; 0 if unknown [m]."""
+        """Return how far the robot could have driven between two poses; 0 if unknown [m]."""
         took_s = (after.stamp_ns - before.stamp_ns) * 1e-9
         return SPEED_MARGIN * self._speed_m_s * took_s if 0.0 < took_s <= LONGEST_S else 0.0
 
     def receive_pose(self, stamped: StampedPose) -> list[Driven]:
-        """Take in the next pose; return those that count now."""
+        """Take in the next pose; return the poses that count now."""
         sure, held = self._sure, self._held
         farthest_m = 0.0 if sure is None else self.farthest_m(sure, stamped)
         if sure is None or not farthest_m or self._is_near(sure, stamped, farthest_m):

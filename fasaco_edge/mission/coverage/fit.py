@@ -4,7 +4,7 @@ On a map of another building, obstacles are as frequent on covered cells as arou
 the same building they are rare on covered cells. So the number of blocked covered cells is compared
 with the number expected by chance, from the share of obstacles among the other known cells around
 them. The ledger belongs to another building if the number exceeds ``OTHER_FROM`` times the expected
-one and is too large for new furniture, or if ``MANY_BLOCKED`` of the known covered cells are
+number and is too large for new furniture, or if ``MANY_BLOCKED`` of the known covered cells are
 blocked.
 
 A map that changes during a mission is compared with the previous map (``map.building_watch``), and

@@ -115,7 +115,7 @@ class Similarity(NamedTuple):
         return cls(origin.y / PIXEL_M, origin.x / PIXEL_M, right, up)
 
     def bounds(self, window: Window) -> Window:
-        """Return the window of this raster that contains ``window`` of the other."""
+        """Return the window of this raster that contains ``window`` of the other raster."""
         corners = [(r, c) for r in (window.row0, window.row1) for c in (window.col0, window.col1)]
         rows = [self.row0 + self.up * col + self.right * row for row, col in corners]
         cols = [self.col0 + self.right * col - self.up * row for row, col in corners]
@@ -165,8 +165,8 @@ class FloorSnapshot:
     def as_grid(self, most: int, frame: str, stamp_ns: int) -> OccupancyGrid | None:
         """Return the swept share of each square as a grid, in percent, rounded down.
 
-        The squares are as small as possible, but at most ``most``. None if even the largest are too
-        many.
+        The squares are as small as possible with at most ``most`` squares. None if even the largest
+        squares are too many.
         """
         rows, cols = zip(*(self.tiles or ((0, 0),)), strict=True)
         low, high = (min(rows), min(cols)), (max(rows) + 1, max(cols) + 1)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     # For types only: a daemon reads its ledger before the kernels are loaded.
     from fasaco_edge.grid.lattice import Cell
 
-# Two poses farther apart than this are a jump, unless the robot can have driven that far [cells]:
+# Two poses farther apart than this are a jump, unless the robot could have driven that far [cells]:
 # the track between them is unknown.
 JUMP_CELLS = 2.0
 
@@ -41,7 +41,7 @@ Cells = NDArray[np.int64]
 class LedgerSnapshot:
     """An immutable copy of a ledger.
 
-    It holds all that a mission keeps over a restart, so also swept floor, order and trail.
+    It holds all that a mission keeps over a restart, with swept floor, order and trail.
 
     Attributes:
         cell_m: edge of a cell [m].
@@ -160,7 +160,7 @@ class CoverageLedger:
         """Forget all visits to some cells; cells under the tool keep one.
 
         Args:
-            inside: mask function: rows and columns of nearby cells, int64 (n,), to bool (n,).
+            inside: returns which cells are chosen, bool (n,), for rows and columns, int64 (n,).
         """
         for places in self._districts():
             visited = [np.argwhere(self._tiles[place]) for place in places]

@@ -1,12 +1,12 @@
 """Loop closures: SLAM corrects the whole map, and moves map and pose at once.
 
 The ledger's cells are places in the map frame. While the tool swept them, the true position of the
-map was somewhere between the old and the new one. So only cells that are covered for every position
-in between still count.
+map was somewhere between the old and the new position. So only cells that are covered for every
+position in between still count.
 
 Small shifts are found by walls alone. A loop closure that moves the map by less than a cell changes
-too few cells for ``has_moved``, and is smaller than the steps between poses of a driving robot. The
-walls show it: once moved back, wall pixels beside free ones lie in the previous walls.
+too few cells for ``has_moved``, and is smaller than the steps between poses of a driving robot. If
+the map is moved back, its wall pixels beside free pixels lie in the previous walls.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDAr
 def moved_mask(
     window: Window, mask: NDArray[np.bool_], motion: Motion, cell_m: float, scale: float = 1.0
 ) -> tuple[Window, NDArray[np.bool_]] | None:
-    """Return the cells with their centre on a marked cell after a motion, and their window.
+    """Return the marked cells after a motion of the map, and their window.
 
     ``mask``: bool (rows, cols) of ``window``, of cells of ``cell_m``. The cells returned are
     ``scale`` times as wide. None if their window is too large.
@@ -158,7 +158,7 @@ def moved_mask(
 def uncertain_cells(
     before: LedgerSnapshot, motion: Motion
 ) -> Callable[[Cells, Cells], NDArray[np.bool_]]:
-    """Return a mask function: rows and columns to cells that may be uncovered, bool (n,)."""
+    """Return a function of rows and columns: whether cells may be uncovered, bool (n,)."""
 
     def inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:
         x, y = ((each.astype(np.float64) + 0.5) * before.cell_m for each in (cols, rows))
@@ -238,11 +238,11 @@ def _covered(
 LEAST_CLOSED = 3
 # Shifts up to FARTHEST_PX along each axis are tried [pixels], on up to MOST_PIXELS.
 FARTHEST_PX, MOST_PIXELS = 4, 2000
-# A shift must move LEAST_ALIKE of these pixels into the previous walls, and BETTER more of them
-# than no shift.
+# A shift must move the share LEAST_ALIKE of these pixels into the previous walls, and a share
+# larger by BETTER than no shift does.
 LEAST_ALIKE, BETTER = 0.5, 0.2
-# If the shares of two shifts differ by less, the smaller shift is taken: along a corridor shifts
-# are alike.
+# If the shares of two shifts differ by less, the smaller shift is taken: along a corridor, the
+# shares of many shifts are alike.
 ALIKE = 0.03
 
 

@@ -96,7 +96,7 @@ class PassedCells:
 
 
 class MissionLedger:
-    """Owns the ledger.
+    """Owns covered cells and swept floor.
 
     Attributes:
         current: the covered cells.
@@ -121,7 +121,7 @@ class MissionLedger:
         Args:
             cell_m: edge of a cell [m].
             tool_m: width of the tool [m].
-            ahead_m: distance of the tool's centre ahead of the robot's turning point [m].
+            ahead_m: distance of the tool's centre ahead of the robot's centre of rotation [m].
             shared: cells swept by other robots; None for a robot alone.
             sight: floor that the tool touches, if it is wider than the robot; else None.
         """
@@ -169,7 +169,7 @@ class MissionLedger:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether no further map can contradict it."""
+        """Whether no further map can contradict the ledger."""
         return self._resumed is None
 
     def restore(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:

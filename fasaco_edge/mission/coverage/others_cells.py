@@ -1,4 +1,4 @@
-"""Cells that other robots have swept, as a part of the ledger; here that of a single robot."""
+"""Cells that other robots have swept, as a part of the ledger; here for a single robot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class OthersCells:
     """The cells that other robots have swept, a part of the ledger; here none.
 
     A robot that has left its fleet keeps the cells that others had swept, in case it joins again.
-    Once it forgets cells of its own, it drops those of others, too: else a forgotten cell that
+    Once it forgets cells of its own, it drops the others' cells, too: else a forgotten cell that
     another robot had swept would still count. The ledger calls ``record_forgotten`` also where it
     calls ``clear``, ``leave_building`` or ``reset``.
 

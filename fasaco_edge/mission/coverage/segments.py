@@ -58,7 +58,7 @@ def segments_between(start: Position, end: Position, tool_m: float) -> list[Segm
 def beside_m(start: Position, end: Position) -> float:
     """Return how far beside the segment between two places the robot may have been [m].
 
-    If its longest possible drive is unknown, it is taken to have driven straight.
+    If the longest possible drive is unknown, the robot is taken to have driven straight.
     """
     length, farthest_m = math.dist(start.point, end.point), end.farthest_m
     if length <= SHORT_M or not farthest_m:

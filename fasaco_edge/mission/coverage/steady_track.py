@@ -6,11 +6,11 @@ poses some poses later.
 
 The noise is estimated from three consecutive poses. A robot drives smoothly: within a tenth of a
 second it deviates by only some millimetres from the straight line between its neighbouring poses. A
-larger lateral deviation is localisation noise; a longitudinal one would be timestamp error. Three
-lateral errors of standard deviation s give a deviation with standard deviation sqrt(1 + 1/4 + 1/4)
-s; its median size is 0.674 times that. Corners are rare, so the median over the last deviations
-ignores them. If poses are far apart, corners are frequent, and are excluded. Drift, which is equal
-in consecutive poses, is not detected.
+larger lateral deviation is localisation noise; a longitudinal deviation would be timestamp error.
+Three lateral errors of standard deviation s give a deviation with standard deviation sqrt(1 + 1/4 +
+1/4) s; its median size is 0.674 times that. Corners are rare, so the median over the last
+deviations ignores them. If poses are far apart, corners are frequent, and are excluded. Drift,
+which is equal in consecutive poses, is not detected.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ class SteadyTrack:
         return [self._place(index) for index in range(self._done, len(self._poses))]
 
     def box_ahead(self) -> tuple[float, float, float, float] | None:
-        """Return the bounds of these places: least x, y, greatest x, y [m]; None for none."""
+        """Return the bounds of the places of ``ahead``: least x, y, greatest x, y [m], or None."""
         if self._done == len(self._poses):
             return None
         # Places are means of poses, so the poses bound them.

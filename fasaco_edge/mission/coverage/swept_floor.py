@@ -51,7 +51,7 @@ from fasaco_edge.mission.coverage.steady_track import Position, SteadyTrack
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
-# Two poses farther apart than this are a jump, unless the robot can have driven that far [tool
+# Two poses farther apart than this are a jump, unless the robot could have driven that far [tool
 # widths].
 JUMP_TOOLS = 2.0
 # Limit on the tiles of a floor: 100 million pixels, the limit of planning. A tile takes 2 kB, and 2
@@ -82,7 +82,7 @@ class SweptFloor:
     """
 
     def __init__(self, tool_m: float, sight: ToolSight | None = None) -> None:
-        """Create an empty one.
+        """Start empty.
 
         Args:
             tool_m: width of the tool [m].
@@ -188,7 +188,7 @@ class SweptFloor:
         """Forget some pixels, except those under the tool now.
 
         Args:
-            inside: mask function: a window to bool (rows, cols).
+            inside: returns which pixels of a window are chosen, bool (rows, cols).
         """
         self.leave(
             lambda tiles: [

@@ -29,7 +29,7 @@ class ToolSight:
         free_at_most: int,
         grid: Callable[[], OccupancyGrid | None],
     ) -> None:
-        """Create one.
+        """Create the sight of a tool.
 
         Args:
             tool_m: width of the tool [m].

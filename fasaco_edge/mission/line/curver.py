@@ -1,8 +1,8 @@
 """Curver: fits curves to the line just ahead, for a robot that cannot turn on the spot.
 
 The line further ahead may still change, and becomes a curve when the robot comes near. A curve
-continues the one before it; if the line changes at the robot, it begins at the robot's pose. Curves
-are not polished.
+continues the previous curve, or begins at the robot's pose if the line changes there. Curves are
+not polished.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ KEPT_SHARE = 0.6
 # robot. The end of a curve shorter than LEAST_M has no certain direction [m].
 AGAIN_M, LEAST_M = 0.5, 0.1
 # The robot has left its curve if its heading is off by ASTRAY_RAD [rad], or its position by
-# ASTRAY_M [m]. The curve is made anew from its pose, and again only after it has moved MOVED_M [m].
+# ASTRAY_M [m]. The curve then begins at the robot's pose, but not again within MOVED_M.
 ASTRAY_RAD, ASTRAY_M, MOVED_M = math.radians(35.0), 0.1, 0.05
 # Segments of the published line shorter than this have no direction of their own [m].
 SHORT_M = 2e-3
@@ -90,7 +90,7 @@ class Curver:
     """Replaces pieces of the line by curves.
 
     Args:
-        config: the robot.
+        config: limits of the robot, and prices of its curves.
     """
 
     def __init__(self, config: CurveConfig) -> None:
@@ -146,7 +146,7 @@ class Curver:
             return np.full(len(xy), pose.yaw)
         ways = np.diff(xy, axis=0)
         along = np.arctan2(ways[:, 1], ways[:, 0])
-        # Short segments get the direction of the next one.
+        # Short segments get the direction of the next segment.
         numbers = np.where(np.hypot(*ways.T) < SHORT_M, len(ways) - 1, np.arange(len(ways)))
         along = along[np.minimum.accumulate(numbers[::-1])[::-1]]
         is_back = np.zeros(len(ways), np.bool_)

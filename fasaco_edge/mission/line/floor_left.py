@@ -1,7 +1,7 @@
 """Floor left: the unswept floor of an order, and how much of it the line ahead sweeps.
 
-The sequencer gives the cells to cover, and the ledger the swept floor; the tally counts for each
-pixel of the rest how often the line sweeps it.
+The sequencer gives the cells to cover, and the ledger the swept floor; the tally counts how often
+the line sweeps each pixel of unswept floor.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from fasaco_edge.mission.work.sequencer import Sequencer
 LEAST_LEFT_M2 = 0.04
 # In a fleet, the ledger holds a passed cell while the unswept floor in it and in a rim of RIM_M [m]
 # is worth WORTH_S [s]. With each cell passed, CHECKED_CELLS held cells are checked. The robot does
-# not return to them: with four robots, returns took a tenth more time for 0.1 % of the floor.
+# not return to them: with four robots, returns took 10 % more time, and swept 0.1 % more floor.
 WORTH_S, RIM_M, CHECKED_CELLS = 4.0, 0.1, 24
 # The robot returns for missed floor if it is more than this share of the floor asked for: the base
 # may have driven beside its line, or poses may be rare. On the map of a real scan matcher, returns
-# for less took an eighth more time for 0.3 % of the floor.
+# for less took an eighth more time and swept only 0.3 % more floor.
 LEAST_MISSED = 0.05
 # Least unswept floor that is reported at the end [m2]: less would be rounded to 0.
 LEAST_REPORTED_M2 = 0.05
@@ -66,8 +66,8 @@ class FloorToSweep(NamedTuple):
 
 
 class UnsweptTally:
-    """Keeps the tally of the line up to date with map, order and ledger; without a floor, does
-    nothing: then only cells are counted."""
+    """Keeps the tally of the line up to date with map, order and ledger; inactive without a floor,
+    when only cells are counted."""
 
     def __init__(
         self,
@@ -83,7 +83,7 @@ class UnsweptTally:
         self._tally: SweepTally | None = None
         # Window in which causes of unreachable floor may be outdated.
         self._unexplained: Window | None = None
-        # The newest reachable area, and ``_reachable`` of it.
+        # The newest reachable area, and the result of ``_reachable`` for it.
         self._reach: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
         # Window of the last update, with its asked-for and its reachable cells.
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
@@ -95,7 +95,7 @@ class UnsweptTally:
         self._possible_m2: float | None = None
 
     def follow(self, floor: FloorMap, tally: SweepTally) -> bool:
-        """Follow the newest map; return whether it has a new raster, on which all may differ."""
+        """Follow the newest map; return whether it has a new raster, where any pixel may differ."""
         is_other, self._tally = tally is not self._tally, tally
         if is_other:
             self._unexplained = self._asked = None
@@ -137,7 +137,7 @@ class UnsweptTally:
         asked, pose = self._orders.cells.asked_of_me(self._map.area), stamped.pose
         lost = self._orders.reach.lost(self._map.area)
         if self._tally is not None:
-            # For the whole order, not only for its last part.
+            # Update the tally for the whole order, not only for its last part.
             self.update()
         thinner_m = grid.geometry.resolution
         self._possible_m2 = possible_m2(floor, thinner_m, (pose.x, pose.y), asked, lost)
@@ -179,7 +179,7 @@ class UnsweptTally:
         is_asked = window.values_at(asked, np.array(unseen, np.int32), 0).tolist()
         for cell, counts in zip(unseen, is_asked, strict=True):
             if counts and tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
-                # The robot missed its point, but its floor is swept.
+                # The robot missed the cell's stand, but the cell's floor is swept.
                 covered.visit(cell)
 
     def _keep(self, passed: NDArray[np.int32]) -> None:

@@ -163,7 +163,7 @@ class LineLayer:
         may_change = may_change and not (
             is_new and (ahead.is_cut or not self._publication.line.is_near)
         )
-        # A way is not polished, as the robot sweeps nothing beside it.
+        # A way is not polished, as the robot does not sweep along it.
         if may_change and is_driven and not self._is_way:
             held = max(held, ahead.line.first_below(CURVED)) if self._curver else held
             self._polisher.polish(ahead, self._map.ground.floor, held, is_settled=self._is_settled)
@@ -187,7 +187,7 @@ class LineLayer:
     def _is_way(self) -> bool:
         """Whether the path is only a way: home, to the dock or to a refuge.
 
-        The path home at the usual end of an order is no way: it sweeps the floor beside it.
+        The path home at the usual end of an order is no way: the robot sweeps along it.
         """
         state = self._orders.order_state
         return bool(state.errand or state.late) or self._route.aside is not None
@@ -210,8 +210,8 @@ class LineLayer:
     ) -> tuple[GridGeometry, NDArray[np.bool_], NDArray[np.bool_]] | None:
         """Return which squares of the floor the tool can reach, and which of these are swept, bool.
 
-        None without a floor. ``most``: limit on the number of squares; where pixels are more,
-        squares are wider, and count as the pixel in their middle.
+        None without a floor. ``most``: limit on the number of squares; if there are more pixels,
+        squares are wider, and have the values of the pixels in their middle.
         """
         floor = self._map.ground.floor
         if floor is None or self._ahead is None or self.left.areas is None:

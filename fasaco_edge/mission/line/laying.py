@@ -1,4 +1,4 @@
-"""Laying of the line along a walk, anew with each walk.
+"""Laying of the line along each new walk.
 
 The line along a new walk leads over stands. Where the previous line, already polished, leads along
 the same cells, it is kept.
@@ -42,7 +42,7 @@ def lay(
         ahead: the line.
         walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
         pose: pose of the robot, in or near the first cell.
-        is_cut: whether the walk ends where a map has cut off the previous one.
+        is_cut: whether the walk ends where a map has cut off the previous walk.
         keeps: whether to keep parts of the line; False for a way to a place, as a polished line
             over the same cells is much longer.
         beside: discs that such a way keeps clear of, see ``Route.beside``.
@@ -78,7 +78,7 @@ def lay(
 
 
 def lay_blocked(ahead: LineAhead, touched: Window) -> bool:
-    """Lay the parts that a map blocks over stands again; return whether there are any.
+    """Lay the parts that a map blocks again, over stands; return whether there are any.
 
     Args:
         ahead: the line.
@@ -92,7 +92,7 @@ def lay_blocked(ahead: LineAhead, touched: Window) -> bool:
         if not ahead.is_clear(line.points[number], line.points[number + 1])
     ]
     if blocked[:1] == [0] and ahead.is_followed:
-        # A lead-out is never clear; do not add another one with each map.
+        # A lead-out is never clear; do not add another lead-out with each map.
         blocked = blocked[leads_out(floor, ahead.place, line.points[1]) :]
     if not blocked:
         return False
@@ -116,13 +116,13 @@ def _past(ahead: LineAhead, discs: Points) -> Polyline:
 
 
 def _join(ahead: LineAhead, pieces: list[Piece], beyond: Piece, *, skips: bool = True) -> None:
-    """Replace the line by one joined from pieces.
+    """Replace the line by a line joined from pieces.
 
     Args:
         ahead: the line.
         pieces: in order.
         beyond: the line beyond a cut, which is not joined.
-        skips: whether it may skip the stand of the robot's cell if the floor there is swept.
+        skips: whether the line may skip the stand of the robot's cell if the floor there is swept.
     """
     if not len(ahead.walk):
         ahead.take([])

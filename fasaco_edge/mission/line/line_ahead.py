@@ -39,7 +39,7 @@ from fasaco_edge.mission.line.polyline import (
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.way import fitting_radius, is_clear_between
 
-# The robot's cell is the first of this many nearest cells with a clear straight way to its stand.
+# The robot's cell is the nearest cell with a clear straight way to its stand, among this many.
 NEAREST_CELLS = 8
 
 
@@ -51,7 +51,7 @@ class LineAhead:
         tally: how often the line sweeps each pixel.
         walk: int32 (n, 2), the walk, with the part that a map has cut off, as the next walk mostly
             leads there again.
-        whole: the line along it.
+        whole: the line along the walk.
         until: number of the walk's cells before the cut.
         cell: index of the robot's cell in the walk.
 
@@ -74,7 +74,7 @@ class LineAhead:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the walk was cut off, and the line beyond is kept for the next one."""
+        """Whether the walk was cut off, and the line beyond is kept for the next walk."""
         return self.until < len(self.walk)
 
     def end_at_cut(self) -> None:
@@ -86,7 +86,7 @@ class LineAhead:
     def follow_floor(self, floor: FloorMap) -> bool:
         """Follow the floor to another raster; return whether the line had to be dropped.
 
-        The line keeps its place on the map, to be checked there, unless the raster is turned.
+        The line keeps its place on the map, to be checked there, unless the raster is rotated.
         """
         is_same, before = floor is self.floor, self._geometry
         self.floor, self._geometry = floor, floor.geometry
@@ -103,7 +103,7 @@ class LineAhead:
         return dropped
 
     def _carry(self, before: GridGeometry) -> None:
-        """Convert to the floor's raster, which has another size or is shifted by part of a pixel.
+        """Convert the line to the floor's raster, of another size or shifted by part of a pixel.
 
         Some mappers begin their maps at the farthest point seen, so that pixels shift with it.
         """
@@ -116,7 +116,7 @@ class LineAhead:
         points, before = self.whole.points, self.tally.shape
         self.whole = self.whole.moved(by)
         moved = self.whole.points
-        # Sweeps outside a raster do not count: subtract edges at its rim before, add them after.
+        # Sweeps outside a raster do not count, so edges at the rim are counted anew after the move.
         margin = self._tool + 1.0
         beyond = is_outside(points, before, margin) | is_outside(moved, shape, margin)
         is_edge = beyond[:-1] | beyond[1:]
@@ -193,7 +193,7 @@ class LineAhead:
 
     @property
     def beside(self) -> Beside | None:
-        """The robot's offset from the line; None if it does not follow one."""
+        """The robot's offset from the line; None if it does not follow a line."""
         return self._place.beside(self.line.points, self.tally.unit_m) if self.is_followed else None
 
     @property
@@ -242,7 +242,7 @@ class LineAhead:
         return bool(points) and all(self.is_clear(a, b) for a, b in ways)
 
     def put(self, first: int, end: int, points: Points) -> None:
-        """Replace the points from ``first`` to ``end`` by polished ones, and update the counts.
+        """Replace the points from ``first`` to ``end`` by polished points, and update the counts.
 
         The first and the last point stay, and keep their cells.
         """

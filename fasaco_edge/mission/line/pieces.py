@@ -1,7 +1,7 @@
 """Pieces of a line, and the joining of pieces to a line.
 
 A line along a new walk reuses the pieces of the previous line that lead along the same cells,
-forward or backward; between them it goes over stands.
+forward or backward; between these pieces it leads over stands.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from fasaco_edge.mission.line.polyline import (
 )
 from fasaco_edge.planners.path import common_beginning
 
-# Least steps of a reused piece: shorter ones would consist mostly of joints. The piece at the robot
-# has one joint only, and may be shorter, so that the line just ahead stays as it is.
+# Least steps of a reused piece: shorter pieces would consist mostly of joints. The piece at the
+# robot has one joint only, and may be shorter, so that the line just ahead stays as it is.
 LEAST_STEPS = 8
 
 
@@ -112,7 +112,7 @@ class Joiner:
         walk: int32 (n, 2), the walk of the new line.
         begin: index of the robot's cell in the walk.
         stand: returns the stand of a cell, float64 (2,).
-        raw: returns the line over the stands of a walk, points and cells from 0.
+        raw: returns the line over the stands of a walk: points, and cell indices from 0.
         is_clear: returns whether the robot can drive straight between two points.
         is_swept: returns whether a cell's stand needs no sweep.
         way: returns the corners of a way round obstacles between two points, float64 (n, 2); none
@@ -130,7 +130,7 @@ class Joiner:
     _done: list[Piece] = field(default_factory=list, init=False)
 
     def joined(self, pieces: list[Piece]) -> list[Piece]:
-        """Return the line as pieces; new ones have ``begin`` -1."""
+        """Return the line as pieces; new pieces have ``begin`` -1."""
         self._done = [Piece(self.here, -1)]
         # The point behind the robot needs the next point; both are kept or dropped.
         if pieces and pieces[0].begin == 0:

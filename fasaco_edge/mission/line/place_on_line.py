@@ -224,7 +224,7 @@ def aligned(points: Points, stands: Points) -> Numbers:
 
     Args:
         points: float64 (n, 2): y, x [pixels], n of 2 or more.
-        stands: float64 (m, 2), the same, NaN where a cell has none; m of 1 or more.
+        stands: float64 (m, 2): y, x [pixels], NaN for a cell without a stand; m of 1 or more.
 
     Returns:
         int64 (n,).

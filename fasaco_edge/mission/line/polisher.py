@@ -29,8 +29,8 @@ HELD_M = 0.5
 # First pass: points are moved along the whole line, in pieces of this length [m].
 MOVED_M = 6.0
 # Second pass: detours to unswept floor, up to AHEAD_M ahead, in pieces of PIECE_M [m]. It begins
-# once all points are moved; within NEAR_M, at once. Farther ahead the map of an exploring robot may
-# still grow.
+# once all points are moved, but within NEAR_M at once. Farther ahead the map of an exploring robot
+# may still grow.
 NEAR_M, AHEAD_M, PIECE_M = 5.0, 8.0, 4.0
 # Third pass: annealing of ANNEALED_PIECES pieces in turn, each ANNEALED_PIECE_M long [m]. They
 # begin ANNEALED_M ahead, or at the end of the held line if that is farther.
@@ -161,7 +161,7 @@ class Polisher:
 
 
 def _piece(lengths: NDArray[np.float64], begin: int, piece_m: float, held: int) -> tuple[int, int]:
-    """Return the range of points of the piece that begins at ``begin``; its first one stays."""
+    """Return the range of points of the piece that begins at ``begin``; its first point stays."""
     begin = min(begin, len(lengths) - 1)
     first = max(int(np.searchsorted(lengths, HELD_M)), begin - 2, held - 1)
     last = int(np.searchsorted(lengths, lengths[begin] + piece_m))

@@ -1,4 +1,4 @@
-"""Published line: the line as last published, and the decision when to publish a changed one.
+"""Published line: the line as last published, and the decision when to publish a changed line.
 
 Maps, plans and polishing change the line all the time, mostly far ahead of the robot. A change
 waits until the robot comes near it, as a later change may undo it. The next metres of the published
@@ -22,8 +22,8 @@ from fasaco_edge.mission.line.polyline import POLISHED, Points
 from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.path.route import Route
 
-# A change nearer than NEAR_M [m], or NEAR_S [s] of driving, is published at once, as the robot
-# needs that much to stop; unless the robot can drive on along the published line.
+# A change nearer than NEAR_M [m], or NEAR_S [s] of driving, is published at once, unless the robot
+# can drive on along the published line: the robot needs that much to stop.
 NEAR_M, NEAR_S = 1.0, 1.0
 # A change nearer than DUE_M [m], or DUE_S [s] of driving, waits up to PATIENCE_S [s] for a plan or
 # for polish: a line that a map has cut off gets a new plan within that time.
@@ -38,7 +38,7 @@ NONE: NDArray[np.float64] = np.empty((0, 2))
 
 
 class PublishedLine:
-    """Compares the line with the published one.
+    """Compares the line with the published line.
 
     Args:
         speed_m_s: speed of the robot.
@@ -47,12 +47,12 @@ class PublishedLine:
     def __init__(self, speed_m_s: float) -> None:
         self._near_m = NEAR_M + NEAR_S * speed_m_s
         self._due_m = DUE_M + DUE_S * speed_m_s
-        # The published points; the index of the next one ahead of the robot, and of the last one
-        # that is held.
+        # The published points; the indices of the next point ahead of the robot, and of the last
+        # point that is held.
         self._xy: Points = NONE
         self._next = self._last_held = 0
-        # At the last comparison: the number of points after the line's first one that equal the
-        # published ones, and the distance to the last of these [m]; infinite if all are equal.
+        # At the last comparison: the number of points, after the line's first, that equal published
+        # points, and the distance to the last of them [m]; infinite if all are equal.
         self._common, self.differs_m = 0, 0.0
         self._due_since = math.inf
 
@@ -121,7 +121,7 @@ class PublishedLine:
         self._common, self.differs_m = max(len(xy) - 1, 0), math.inf
 
     def reset(self) -> None:
-        """Forget the line: the robot has none, or another one."""
+        """Forget the line: the robot has no line, or another line."""
         self.record_published(NONE, 0)
 
 
@@ -154,7 +154,7 @@ class Publication:
         self._stay = Stay(STANDING_M)
 
     def compare(self, ahead: LineAhead) -> int:
-        """Compare the line with the published one; return how many of its points are held."""
+        """Compare the line with the published line; return how many of its points are held."""
         self.line.compare(ahead.next_xy(COMPARED_POINTS))
         return self.line.held
 
@@ -166,7 +166,7 @@ class Publication:
         Args:
             ahead: the line, as at the last comparison.
             update: the new path, if there is one.
-            reason: why the line changes; "" if it does not, or is polished.
+            reason: why the line changes; "" if it does not change, or only by polishing.
             now: [s].
             is_way: whether the path is only a way: then nothing waits.
         """
@@ -202,7 +202,7 @@ class Publication:
         return replace(update, xy=ahead.xy())
 
     def _is_settled(self, ahead: LineAhead) -> bool:
-        """Whether neither a plan nor polish is under way that changes the next metres."""
+        """Whether no plan and no polishing under way can change the next metres."""
         route = self._route
         is_planned = not route.requests.wanted and (
             route.requests.pending is None or route.requests.is_improving

@@ -58,7 +58,7 @@ class SweepTally:
         # Per pixel: flags WANTED, OPEN, SWEPT and PASSED, and why it is out of reach.
         self._state = np.zeros(shape, np.uint8)
         self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
-        # Numbers of wanted pixels, of swept ones among them, and of open ones.
+        # Numbers of wanted pixels, of wanted pixels that are swept, and of open pixels.
         self._wanted_pixels = self._swept_pixels = self._open_pixels = 0
         # Number of pixels out of reach, by cause; the first element is unused.
         self._beyond_pixels = np.zeros(len(OUT_OF_REACH) + 1, np.int64)
@@ -166,7 +166,7 @@ class SweepTally:
     def sampled(self, step: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return which of every ``step``-th pixels are not out of reach, and which are swept.
 
-        Pixels that are not free are not out of reach, either.
+        Pixels that are not free do not count as out of reach.
         """
         state = self._state[step // 2 :: step, step // 2 :: step]
         return state & CAUSE == 0, state & SWEPT != 0
@@ -188,7 +188,7 @@ class SweepTally:
 
     @property
     def passed_m2(self) -> float:
-        """Area asked for, not known to be swept, and passed or in narrow strips [m2]."""
+        """Area asked for but not known to be swept that was passed or is in narrow strips [m2]."""
         pixels = self._wanted_pixels - self._swept_pixels - self._open_pixels
         return pixels * self.unit_m**2
 

@@ -1,4 +1,4 @@
-"""Unswept floor: why a pixel of the floor is not swept."""
+"""Causes of unswept floor."""
 
 from __future__ import annotations
 

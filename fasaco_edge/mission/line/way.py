@@ -41,7 +41,7 @@ RADIUS_ERROR_PX = 0.125
 def is_clear_between(floor: FloorMap, a: Points, b: Points, radius: float | None = None) -> bool:
     """Return whether the robot can drive straight between two points, (2,): y, x [pixels].
 
-    ``radius``: of a smaller disc than the robot's [pixels]; None for the robot's.
+    ``radius``: radius of a smaller disc [pixels]; None for the robot's disc.
     """
     if math.isnan(b[0]):
         return False

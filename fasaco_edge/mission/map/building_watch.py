@@ -1,7 +1,7 @@
 """Building watch: whether the newest map still shows the building of the ledger.
 
-A new map in the same frame may show another floor, another building, or the same one rotated. Then
-the cells known to both maps are equal (blocked or free) no more often than by chance: Cohen's
+A new map in the same frame may show another floor, another building, or the same building rotated.
+Then the cells known to both maps are equal (blocked or free) no more often than by chance: Cohen's
 kappa, 1 for equal maps, is about 0. After a loop closure the maps agree if the previous map is
 moved in the same way as the robot's pose. If they still disagree, the robot stands still. If they
 disagree for some seconds, the map shows another building. If a mapper alternates between two
@@ -13,7 +13,7 @@ parts, and the first maps of a restarted mapper, differ from the previous map in
 Measured on 5 buildings, cells of 0.3 m: the highest kappa of two buildings is 0.22, and 0.35 for
 the first 2 m that a scanner sees in another building. The lowest kappa in one building is 0.59 for
 maps shifted by 0.3 m, and 0.32 by 0.6 m; 0.67 if furniture moves on 10 % of the coverable cells,
-and 0.34 on 30 %. Floors with equal walls count as one building, so each needs a frame of its own.
+and 0.34 on 30 %. Floors with equal walls count as one building, so each floor needs its own frame.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Agreement:
 
     @classmethod
     def of(cls, before: CoverageLattice, after: CoverageLattice, motion: Motion = STILL) -> Self:
-        """Compare two lattices, the first one moved by ``motion``; if large, by a sample."""
+        """Compare two lattices, the first one moved by ``motion``; large ones by a sample."""
         places = np.flatnonzero(after.states != UNKNOWN)
         stride = 1 + len(places) // MOST_CELLS
         places = places[::stride]
@@ -128,14 +128,13 @@ class BuildingWatch:
         self._agreed_at = 0.0
         # Whether the newest map shows no floor, so that nothing is decided.
         self._is_blind = False
-        # Number of changes of building, and the time of the last one.
+        # Number of changes of building, and the time of the last change.
         self._changes, self._changed_at = 0, float("-inf")
-        # If the newest map of the same building has changed, until the next pose: the agreement of
-        # the map, and the pose at that time.
+        # If the newest map shows the same building with changes: its agreement with the reference,
+        # and the pose at that time; None after the next pose.
         self._shifted: tuple[Agreement, Pose2D] | None = None
         # Whether a loop closure was found since the last ``pop_closure``.
         self._has_closed = False
-        # The last jump of the pose, and its time.
         self._jump: tuple[Motion, float] | None = None
 
     @property
@@ -144,7 +143,7 @@ class BuildingWatch:
         return self._foreign is not None
 
     def reset(self) -> None:
-        """Take the next map as the first one."""
+        """Take the next map as the first map."""
         self.why, self._reference, self._newest = "", None, None
         self._foreign = self._jump = self._shifted = None
         self._has_closed = self._is_blind = False
@@ -161,7 +160,7 @@ class BuildingWatch:
         self._jump = Motion(start, end), now
 
     def receive_blank_map(self) -> None:
-        """Take in a map without floor: it shows no building, and its time does not count."""
+        """Take in a map without floor: it shows no building, and time with it does not count."""
         self._is_blind = True
 
     def receive_map(
@@ -208,7 +207,7 @@ class BuildingWatch:
         return pose
 
     def receive_pose(self, pose: Pose2D, now: float) -> bool:
-        """Take in a pose; return whether it explains the newest map, perhaps by a loop closure."""
+        """Take in a pose; return whether the newest map shows the building, perhaps moved."""
         shifted, self._shifted = self._shifted, None
         if self._foreign is not None:
             _, seen, before = self._foreign

@@ -46,7 +46,7 @@ class ConfiguredPlaces:
     """Returns the configured places while the map they belong to is in use.
 
     Attributes:
-        note: which map they belong to; kept with the order.
+        note: which map the places belong to; kept with the order.
         mask_frame: frame of the map that the keep-out mask belongs to; "" for any.
     """
 
@@ -70,7 +70,7 @@ class ConfiguredPlaces:
         values = {name: getattr(given, name) for name in self._names}
         of = msgspec.json.encode((values, given.map_frame))
         self._of = f"{zlib.crc32(of):08x}"
-        # The frame in use, "" before there is one; and the last fault reported.
+        # The frame in use, "" before the first map; and the last fault reported.
         self._here = self._said = ""
 
     def enter(self, frame: str) -> PlacesElsewhere | None:

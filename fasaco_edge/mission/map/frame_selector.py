@@ -2,7 +2,7 @@
 
 A frame becomes active once both a map and a pose have arrived in it. From then on maps and poses in
 other frames are refused, but the newest map in another frame is kept. The other frame becomes
-active if, for ``PATIENCE_S``, map and poses arrive in it, and no pose in the active one. So a
+active if, for ``PATIENCE_S``, map and poses arrive in it, and no pose in the active frame. So a
 single message in a wrong frame changes nothing. The frame of a ledger from before a restart is
 active from the start.
 """
@@ -58,7 +58,7 @@ class FrameSelector:
         """Apply updates to maps of frames that are not active.
 
         Returns:
-            The updates that were not applied; and the faults of those applied.
+            The updates that were not applied; and the faults of the applied updates.
         """
         others = [frame for frame in self._maps if self.active not in ("", frame)]
         faults: list[FasacoError] = []

@@ -102,7 +102,7 @@ class MissionGround:
         return decided
 
     def place_of(self, cell: Cell) -> Point | None:
-        """Return the robot's position for a cell, x, y [m]; None if it cannot stand there."""
+        """Return the robot's position for a cell, x, y [m]; None if the robot does not fit."""
         floor = self.floor
         if floor is None:
             cell_m = self._config.footprint.cell_m
@@ -112,7 +112,7 @@ class MissionGround:
     def places_of(self, cells: NDArray[np.int32]) -> NDArray[np.float64]:
         """Return the robot's positions x, y [m], float64 (n, 2), for cells, int32 (n, 2).
 
-        NaN where it cannot stand.
+        NaN where the robot does not fit.
         """
         if self.floor is None:
             assert self.lattice is not None

@@ -10,7 +10,7 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.driven_poses import SPEED_MARGIN, DrivenPoses
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 
-# A lost robot is searched for this far ahead on its line, as driving time [s].
+# After a gap in the poses, the robot is searched for on its line within this driving time [s].
 LOST_ON_LINE_S = 10.0
 # Poses are too far apart if the track to half of the last LOOKED_BACK poses is unknown.
 LOOKED_BACK = 10
@@ -62,7 +62,7 @@ class InputMonitor:
         self.map_at = now
 
     def receive_pose(self, stamped: StampedPose, now: float) -> bool:
-        """Take in a pose; return whether the track from the last one is unknown."""
+        """Take in a pose; return whether the track from the last pose is unknown."""
         last, lost, pose = self._pose, self.is_pose_lost(now), stamped.pose
         self._pose, self.pose_at, self._has_pose = stamped, now, True
         self.farthest_m = self.on_line_m = 0.0
@@ -75,8 +75,8 @@ class InputMonitor:
         gap_s = min((stamped.stamp_ns - last.stamp_ns) * 1e-9, LOST_ON_LINE_S)
         self.on_line_m = SPEED_MARGIN * self._config.speed_m_s * max(gap_s, 0.0)
         distance = math.hypot(pose.x - last.pose.x, pose.y - last.pose.y)
-        # Consecutive poses may be some cells apart, or as far as the robot can have driven; after a
-        # timeout, only half a cell.
+        # Consecutive poses may be some cells apart, or as far as the robot could have driven; after
+        # a timeout, only half a cell.
         most_m = (0.5 if lost else JUMP_CELLS) * self._config.footprint.cell_m
         jumped = distance > max(most_m, self.farthest_m)
         if jumped:

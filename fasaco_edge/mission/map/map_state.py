@@ -56,7 +56,7 @@ class MapState:
             before the first.
         pose: the newest pose in the map's frame; before the first map, in any frame.
         has_moved: whether the newest map shows walls at other places, after a loop closure.
-        shift: a small shift of the newest map against the previous one; None for none.
+        shift: a small shift of the newest map against the previous map; None for none.
         shows_floor: whether the newest map shows floor; else it gives no evidence of walls.
         area: the reachable area as of the last ``update_area``; None while the robot's pose is on
             no coverable cell.
@@ -97,7 +97,7 @@ class MapState:
         """
         is_active_now = False
         if self.frames.active not in ("", grid.frame):
-            # Its frame may become active later, so it is kept unless too large.
+            # The map's frame may become active later, so the map is kept unless it is too large.
             lattice_window(
                 grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
             )
@@ -116,7 +116,7 @@ class MapState:
         return self.frames.receive_map(grid) or is_active_now
 
     def switch_frame(self) -> bool:
-        """Switch to map and pose of the active frame; return whether the map is another one."""
+        """Switch to map and pose of the active frame; return whether the map has changed."""
         grid = self.frames.newest_map
         is_other = grid is not None and (self.grid is None or self.grid.frame != grid.frame)
         if grid is not None and is_other:
@@ -155,7 +155,7 @@ class MapState:
     def without_obstacles(self, lattice: CoverageLattice) -> CoverageLattice:
         """Return a lattice over the newest map, with the cells near obstacles unknown.
 
-        So it shows the building without robots that stand in it.
+        The lattice then shows the building without robots that stand in it.
         """
         if self.grid is None or self.given is None or self.grid is self.given:
             return lattice
@@ -203,14 +203,14 @@ class MapState:
         self.has_moved, self._shown = has_moved(change), change.after
 
     def continue_from(self, before: MapState) -> None:
-        """Take over a predecessor's doubt about the building; it had the same cells."""
+        """Take over the doubt about the building of a predecessor, which had the same cells."""
         self.building = before.building
 
     def receive_pose(self, pose: StampedPose) -> None:
         """Take in a pose.
 
         Raises:
-            WrongFrame: it is not in the map's frame, or not in the active one.
+            WrongFrame: the pose is not in the map's frame, or not in the active frame.
         """
         if self.grid is not None and pose.frame != self.grid.frame:
             raise WrongFrame(f"pose in frame {pose.frame!r}, map in {self.grid.frame!r}")
@@ -240,7 +240,7 @@ class MapState:
         self.area = None
 
     def robot_cell(self) -> Cell | None:
-        """Return the coverable cell at the robot; for a robot in its dock, in front of the dock."""
+        """Return the coverable cell at the robot; in its dock, the cell in front of the dock."""
         lattice, cell = self.ground.lattice, self.path_cell
         if lattice is None or self.pose is None:
             return None
@@ -316,7 +316,7 @@ class MapState:
     def check_zones(self, order: MissionOrder) -> None:
         """Check that part of each zone, in the map frame, lies on the map, if there is one.
 
-        Rooms lie where they were found: a map that begins anew grows to them.
+        Rooms are not checked: a map that begins anew will grow to include them.
 
         Raises:
             OrderError: a zone lies off the map.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 
-# Floor is closed for CLOSED_S, twice as long each time again, up to MOST_CLOSED_S [s].
+# Floor is closed for CLOSED_S, twice as long each further time, up to MOST_CLOSED_S [s].
 CLOSED_S, MOST_CLOSED_S = 20.0, 320.0
 # Reports within SAME_M [m] mean the same obstacle. It is forgotten FORGET_S [s] after its floor was
 # opened.
@@ -96,7 +96,7 @@ class Obstacles:
         return True
 
     def open_due(self, now: float) -> bool:
-        """Open floor when its time is up; return whether there was any."""
+        """Open floor when its time is up; return whether any was opened."""
         self._past = [one for one in self._past if now - one.until < FORGET_S][-MOST:]
         due = [one for one in self._closed if now >= one.until]
         if due:
@@ -105,7 +105,7 @@ class Obstacles:
         return bool(due)
 
     def on(self, grid: OccupancyGrid) -> OccupancyGrid:
-        """Return a map with the obstacles drawn; unchanged without any, or if it is too large."""
+        """Return a map with the obstacles drawn; a map that is too large stays as it is."""
         if not self._closed or grid.cells.size > MOST_PIXELS:
             return grid
         cells = grid.cells.copy()

@@ -14,7 +14,7 @@ class Stay:
     """The last place that the robot moved to.
 
     Args:
-        within_m: how far from the place it still counts as there [m].
+        within_m: distance from the place up to which the robot counts as there [m].
 
     Attributes:
         since: start of the time there [s].
@@ -45,5 +45,5 @@ class Stay:
         self.since = at
 
     def forget(self) -> None:
-        """Take the next place as another one."""
+        """Take the next position as a new place."""
         self._at = math.inf, math.inf

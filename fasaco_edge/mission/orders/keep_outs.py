@@ -18,7 +18,7 @@ from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
 from fasaco_edge.grid.polygons import polygon_flaw
 from fasaco_edge.host.documents import StrictDocument
 
-# Limits on the places of an order, as it is part of the ledger, which is written once a second.
+# Limits on the places of an order, which is part of the ledger: this is written once a second.
 MOST_KEEP_OUT = 100
 MOST_POINTS = 1_000
 MOST_POINTS_IN_ALL = 5_000
@@ -98,7 +98,7 @@ def added(keep_outs: KeepOuts, new: KeepOut) -> KeepOuts:
 
 
 def removed(keep_outs: KeepOuts, unwanted: KeepOut) -> KeepOuts:
-    """Return keep-outs without the one that has the name of ``unwanted``.
+    """Return keep-outs without the keep-out that has the name of ``unwanted``.
 
     Raises:
         OrderError: there is no keep-out of this name.
@@ -117,14 +117,14 @@ def removed(keep_outs: KeepOuts, unwanted: KeepOut) -> KeepOuts:
 
 
 def name_faults(name: str, key: str = "name") -> Iterator[OrderError]:
-    """Yield unprintable characters and spaces at an end of a place's name; "" has none."""
+    """Yield the fault of a place's name that is not printable, or has a space at an end."""
     if name and not (name.isprintable() and name.strip() == name):
         text = f"must be 1..{LONGEST_NAME} printable characters, got {name!r:.80}"
         yield OrderError(text, key=key)
 
 
 def polygon_faults(polygons: Mapping[str, Polygon]) -> Iterator[OrderError]:
-    """Yield the first fault of each polygon beyond its type; all have too many points, or each."""
+    """Yield the first fault of each polygon, or one fault if they have too many points in all."""
     points = sum(map(len, polygons.values()))
     if points > MOST_POINTS_IN_ALL:
         text = f"polygons must have at most {MOST_POINTS_IN_ALL} points, got {points}"

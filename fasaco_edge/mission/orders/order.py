@@ -58,10 +58,10 @@ class Zone:
         kinds: settings of each pass; () if all passes are usual.
         room: number of the room whose outline it follows; 0 for none.
         holes: polygons within ``polygon`` that are not part of it.
-        without: for everything: the rooms that are left out.
+        without: the rooms that a zone of everything leaves out.
         priority: zones of higher priority come first if time or battery do not allow all; None for
-            the room's priority, or the usual one.
-        ranked: for everything: the rooms with a priority of their own.
+            the room's priority, or the usual priority.
+        ranked: the rooms in a zone of everything that have a priority of their own.
         is_as_usual: whether the order gives no passes, so that a room's settings apply.
     """
 

@@ -68,7 +68,7 @@ _TAKES: dict[str, tuple[set[str], set[str]]] = {
 
 
 def room_faults(command: str, asked: RoomRequest | None) -> Iterator[OrderError]:
-    """Yield what is missing in the request of a command, wrong, or for another command."""
+    """Yield the faults of a command's request: members missing, or for another command."""
     if (asked is not None) != (command in _TAKES):
         got = "missing" if asked is None else "got it"
         yield OrderError(f"goes with {', '.join(_TAKES)}, {got} with {command}", key="room")

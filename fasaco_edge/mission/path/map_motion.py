@@ -34,8 +34,6 @@ class _Before(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class MapMotion:
-    """Moves coverage, reached cells, trail and path with the map."""
-
     _ledger: MissionLedger
     _orders: Sequencer
     _trail: TrailLayer
@@ -46,7 +44,7 @@ class MapMotion:
     _shown: tuple[Motion, NDArray[np.int32] | None, int] | None = field(default=None, init=False)
 
     def receive_map(self, pose: Pose2D) -> None:
-        """Keep what lay on the previous map: the newest has moved under a robot at ``pose``.
+        """Keep the state on the previous map: the newest map has moved under a robot at ``pose``.
 
         If the map moves again before a pose shows how, the state before the first motion counts.
         """
@@ -97,6 +95,6 @@ class MapMotion:
         self._before = self._before._replace(reached=None, path=None)
 
     def leave_map(self) -> None:
-        """Forget the trail and what is to be moved: they lay on another map."""
+        """Forget the trail and the state to be moved: they belong to another map."""
         self._trail.reset()
         self._before, self._shown = _Before(), None

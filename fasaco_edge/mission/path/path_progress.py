@@ -42,7 +42,7 @@ class PathProgress:
     def driven_to(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> PathProgress:
         """Return the path with the robot in ``cell``, if it drove there along the path.
 
-        A pose that flickers into the neighbouring lane must not skip the cells between.
+        A wrong pose in the neighbouring lane must not skip the cells between.
         """
         near: list[Cell] = [
             (row, col) for row, col in self.cells[self.index : self.index + LOOK_AHEAD].tolist()

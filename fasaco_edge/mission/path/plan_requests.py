@@ -19,9 +19,9 @@ from fasaco_edge.planners.walk_before import HELD_CELLS
 BROKEN_S = 30.0
 # Reason of a request for a better path.
 SPARE_TIME = "spare time"
-# Longest time of an attempt: by repairs, and by a search of the whole rest [s].
+# Longest time of an attempt: by repairs, and by a search of the whole path ahead [s].
 REPAIR_S, SEARCH_S = 0.05, 0.3
-# A better path replaces the path only if it saves this many steps and this share of the rest.
+# A better path replaces the path only if it saves this many steps and this share of the cost.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
 # A walk from a full search has to save this share, as its line is made and polished again.
 NEW_WALK_SHARE = 0.01
@@ -180,7 +180,7 @@ class PlanRequests:
         self._is_by_map = changed is not None
 
     def want_instead(self, reason: str, changed: Window | None) -> None:
-        """Note that a plan is wanted in place of an outdated one; an earlier reason stays."""
+        """Note that a plan is wanted in place of an outdated plan; an earlier reason stays."""
         self.changed = Window.around(self.changed, changed)
         if not self.wanted:
             self.want(reason, changed)
@@ -201,7 +201,7 @@ class PlanRequests:
         self._is_abandoned = self.pending is not None
 
     def abandon(self) -> None:
-        """Drop the wanted plan, and discard the pending one: they are for another order."""
+        """Drop the wanted plan, and discard the pending plan: they are for another order."""
         self.want_none()
         self.forget_failure()
         self.discard_pending()
@@ -271,5 +271,5 @@ class PlanRequests:
         self._has_map = True
 
     def forget_failure(self) -> None:
-        """Forget the failed plan: a command requests one, or one has succeeded since."""
+        """Forget the failed plan: a command requests a new plan, or a plan has succeeded since."""
         self._failure, self._failures = ("", 0.0), 0

@@ -63,7 +63,7 @@ class Route:
         self._checked_on: ReachableArea | None = None
 
     def continue_from(self, before: Route) -> None:
-        """Continue the counts of another route; a plan pending there is dropped."""
+        """Continue the counts of another route; its pending plan is discarded."""
         self.requests.continue_from(before.requests)
         self.revision = before.revision
         self.unchanged, self.outdated = before.unchanged, before.outdated
@@ -87,7 +87,7 @@ class Route:
         return self.path if len(self.path.cells) else self._kept
 
     def abandon(self) -> None:
-        """Cancel the wanted plan, and discard the pending one: it is for another order."""
+        """Cancel the wanted plan, and discard the pending plan: they are for another order."""
         self.requests.abandon()
         self._kept, self.aside = PathProgress(NO_CELLS), None
 
@@ -143,7 +143,7 @@ class Route:
     def move(self, before: NDArray[np.int32], motion: Motion, now: float) -> PathUpdate | None:
         """Move the path with the map, and ask for a plan that repairs it.
 
-        Its drivable part is published at once: the robot must not follow the old position.
+        Its drivable part is published at once: the robot must not follow the path at its old place.
         ``before``: int32 (n, 2), n >= 1, ``path_to_keep`` before the map moved.
         """
         self.requests.discard_pending()
@@ -250,7 +250,7 @@ class Route:
         end_yaw: float | None = None,
         beside: NDArray[np.float64] | None = None,
     ) -> PathUpdate:
-        """Publish a path that replaces the current one."""
+        """Publish a path that replaces the current path."""
         self.revision += 1
         self.is_way_out = False
         self._numberings += 1
@@ -266,7 +266,7 @@ class Route:
     def publish_way_out(
         self, way: NDArray[np.float64], reason: str, now: float
     ) -> PathUpdate | None:
-        """Publish a way off the cells, float64 (n, 2): x, y [m], and keep the current path.
+        """Publish a way along no cells, float64 (n, 2): x, y [m], and keep the current path.
 
         Return None for an empty way if there is no path to stop.
         """
@@ -309,7 +309,7 @@ class Route:
             self._kept = held
 
     def stop(self, reason: str, now: float) -> PathUpdate | None:
-        """Publish an empty path and keep the current one; None without a path to drive."""
+        """Publish an empty path and keep the current path; None without a path to drive."""
         if not len(self.path.cells) and not self.is_way_out:
             return None
         kept = self.path_to_keep

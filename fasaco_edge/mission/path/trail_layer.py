@@ -29,7 +29,6 @@ class TrailLayer:
         self._config = config
         self._map, self._route = map_state, route
         self.trail = LivingTrail(config.trail)
-        # The lattice that the trail lies on.
         self._lattice: CoverageLattice | None = None
         # The robot's last path, and its index on it.
         self._path, self._index = NO_CELLS, 0

@@ -45,7 +45,7 @@ class RoomSettings:
         passes: number of passes; None for the order's.
         kinds: settings of each pass; () if all are usual.
         skip: whether orders for everything leave the room out.
-        priority: 0 to 100; higher ones come first if time or battery do not allow all.
+        priority: 0 to 100; rooms of higher priority come first if time or battery do not allow all.
     """
 
     passes: int | None = None
@@ -107,7 +107,7 @@ class RoomSheet:
         pending: squares of these regions.
         settled: the squares of rooms some updates ago, without what the newest maps have added.
         changes: scores of possible changes (what, room, other room): a room that may join another,
-            or a part of it that may. Each update that shows a change adds 1, others subtract 2.
+            or a part of a room that may. Each update that shows a change adds 1, others subtract 2.
     """
 
     frame: str
@@ -172,7 +172,7 @@ class RoomSheet:
 
     @property
     def is_named(self) -> bool:
-        """Whether it has a room that no map may remove."""
+        """Whether the sheet has a room that no map may remove."""
         return any(room.is_kept for room in self.rooms.values())
 
 
@@ -248,7 +248,7 @@ class RoomBook:
         """Give a room a name; "" removes its name.
 
         Raises:
-            OrderError: there is no such room, another one has that name, or it is no valid name.
+            OrderError: there is no such room, another room has that name, or the name is not valid.
         """
         room = self.room(called)
         if name:
@@ -298,7 +298,7 @@ class RoomBook:
             self.version += 1
 
     def put_by_hand(self, room: Room) -> None:
-        """Replace a room by order of people."""
+        """Replace a room as people have requested."""
         assert self.sheet is not None
         self.put(room)
         self.sheet.fix()
@@ -334,7 +334,7 @@ class RoomBook:
         self.version += 1
 
     def turn_to(self, sheet: RoomSheet) -> None:
-        """Use a sheet, new or not.
+        """Use a sheet, which may be new.
 
         Beyond ``MOST_SHEETS``, the least recently used sheet is dropped, if possible one without
         kept rooms.

@@ -70,9 +70,9 @@ def split(book: RoomBook, called: str | int, cut: Cut) -> None:
 
 
 def merge(book: RoomBook, called: Sequence[str | int], name: str = "") -> None:
-    """Merge rooms that are joined, into the one with the smallest number.
+    """Merge joined rooms into the room with the smallest number.
 
-    It gets ``name``; by default the name of the first room, by number, that has one.
+    The merged room gets ``name``; by default the name of the named room with the smallest number.
 
     Raises:
         OrderError: there is no such room, the rooms are not joined, or the name is taken.

@@ -8,12 +8,12 @@ grows over new floor of its region. Other changes must last:
 - rooms in one region stay divided as before, and join after ``HOLD_CHANGE`` updates,
 - a large part of a room in another room's region joins that room after ``HOLD_CHANGE`` updates.
 
-An update without the change counts twice against it, so that a flickering change never lasts. A
-room that joined another and separates again gets its number back. Rooms that people have named,
-set, split or merged are kept: maps do not join them. A map separates from them only a part with new
-floor: more than a fifth of the part, or half of it if the room was split or merged. Two kept rooms
-in one region stay divided as before. Squares that only the newest maps have added do not decide
-which region shows a room. Rooms that the map does not show stay unchanged.
+An update without the change counts twice against it, so that a change that comes and goes never
+lasts. A room that joined another and separates again gets its number back. Rooms that people have
+named, set, split or merged are kept: maps do not join them. From a kept room, a map separates only
+a part with much new floor: more than a fifth of the part, or half of it if the room was split or
+merged. Two kept rooms in one region stay divided as before. Squares that only the newest maps have
+added do not decide which region shows a room. Rooms that the map does not show stay unchanged.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
 # A region with this share of a room's size shows the whole room: squares of the room outside the
 # region are then no floor.
 WHOLE = 0.8
-# A part of a named or set room stays with it if this share of the part has long been the room's.
+# A part of a named or set room stays in it if this share of the part has long belonged to it.
 FIRM = 0.8
 
 
@@ -76,7 +76,7 @@ def common_counts(labels: Labels, slots: Ids, most: int) -> NDArray[np.int64]:
 
 @dataclass(slots=True)
 class _Region:
-    """A region that is no room yet: its label, and the updates until it becomes one."""
+    """A region that is no room yet: its label, and the number of updates until it is a room."""
 
     label: int
     hold: int
@@ -104,7 +104,7 @@ class Matching:
         self._firm = common_counts(labels, self._slots * self._is_settled(), len(sheet.rooms))
         self._areas = self._counts.sum(axis=1)
         self._shown_by = self._find_shown()
-        # The room that squares go to, by region and slot.
+        # The room to which squares change, by region and slot.
         self._becomes = np.tile(np.array(self._rooms, np.uint16), (len(self._areas), 1))
         self._to_divide: list[int] = []
         self._regions: list[_Region] = []
@@ -214,8 +214,8 @@ class Matching:
         if self._counts[label, 1:].max(initial=0) >= half:
             parent = int(self._counts[label, 1:].argmax()) + 1
         is_kept = parent > 0 and self._room(parent).is_kept
-        # A kept room loses no part that it has had for long. But it may have got its name when it
-        # and another room were half seen, as one region.
+        # A kept room loses no part that it has had for long. But it may have been named when parts
+        # of it and of another room were seen as one region.
         least = half if parent and self._room(parent).is_by_hand else FIRM * self._areas[label]
         is_firm = parent > 0 and bool(self._firm[label, parent] >= least)
         if parent and (is_firm or not is_kept):
@@ -226,7 +226,7 @@ class Matching:
             self._regions.append(_Region(label, HOLD_CHANGE if parent else HOLD_NEW))
 
     def _count_changes(self) -> list[tuple[str, int, int]]:
-        """Score all pending changes; return those that have lasted."""
+        """Score all pending changes; return the changes that have lasted."""
         scores = dict[tuple[str, int, int], int]()
         for change, score in self._sheet.changes.items():
             if change not in self._changes and score > PENALTY:
@@ -251,7 +251,7 @@ class Matching:
         numbers[inside] = ids[inside]
 
     def _number_regions(self) -> None:
-        """Score the regions that are no rooms yet; those that have lasted become rooms."""
+        """Score the regions that are no rooms yet; regions that have lasted become rooms."""
         sheet, before = self._sheet, self._sheet.pending.on(self._window)
         counts = common_counts(self._labels, before, max(sheet.regions, default=0))
         squares = np.bincount(sheet.pending.ids.ravel(), minlength=counts.shape[1])
@@ -321,7 +321,7 @@ class Matching:
                 self._ids[at][is_lost] = before[at][is_lost]
 
     def _keep(self, before: Ids) -> None:
-        """Restore the squares of kept rooms that lost all; drop other rooms without squares."""
+        """Restore the squares of kept rooms that lost nearly all; drop other rooms as small."""
         squares = np.bincount(self._ids.ravel(), minlength=self._book.next_id)
         empty = []
         for room in self._book.rooms:
@@ -337,7 +337,7 @@ class Matching:
 
 
 def spread(ids: Ids, allowed: NDArray[np.bool_]) -> None:
-    """Give squares without a number the number of the nearest square with one, in place.
+    """Give squares without a number the number of the nearest numbered square, in place.
 
     Distance is counted in steps over edges of squares.
 

@@ -16,7 +16,7 @@ from fasaco_edge.mission.coverage.floor_tiles import Mask
 from fasaco_edge.mission.rooms.room_book import LEAST_M2, MOST_NUMBER, Room, RoomBook, RoomSheet
 from fasaco_edge.mission.rooms.room_raster import Ids
 
-# Change of a room after which its outline is updated [m2]: pixels along walls flicker.
+# Change of a room after which its outline is updated [m2]: pixels along walls are noisy.
 STALE_M2 = 0.1
 MOST_CORNERS = 100
 # Largest distance of a dropped corner from the outline [m]: the first value that gives a valid
@@ -167,7 +167,7 @@ def stale(sheet: RoomSheet, before: Ids) -> list[int]:
 
 
 def refresh(book: RoomBook, changed: Iterable[int]) -> None:
-    """Update outline and area of changed rooms, and neighbours of all."""
+    """Update outline and area of changed rooms, and the neighbours of all rooms."""
     sheet = book.sheet
     rooms = set(changed)
     if sheet is None or not rooms:

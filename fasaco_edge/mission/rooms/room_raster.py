@@ -85,7 +85,7 @@ class RoomRaster:
         return window, mask[window.slices_in(self.window)].copy()
 
     def coarser(self, factor: int) -> RoomRaster:
-        """Return the raster with squares ``factor`` times as wide, numbered as at their centres."""
+        """Return the raster with squares ``factor`` times as wide, by the numbers at centres."""
         window = self.window.rounded_out(factor)
         ids = self.on(window)[factor // 2 :: factor, factor // 2 :: factor]
         edges = (window.row0, window.col0, window.row1, window.col1)

@@ -101,7 +101,7 @@ class RoomWatch:
         self._key, self._is_seen = (), False
 
     def on(self, grid: OccupancyGrid | None) -> RoomBook:
-        """Return the book if its rooms are in the frame of a map, else an empty one."""
+        """Return the book if its rooms are in the frame of a map, else an empty book."""
         is_here = grid is None or self.book.frame in ("", grid.frame)
         return self.book if is_here else RoomBook()
 
@@ -139,12 +139,12 @@ def _widen(sheet: RoomSheet, factor: int) -> None:
 
 
 def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
-    """Return the sheet of the building that a map shows, perhaps a new one."""
+    """Return the sheet of the building that a map shows, perhaps a new sheet."""
     in_use = book.sheet if book.frame == frame else None
     if in_use is not None and in_use.is_named:
         return in_use
-    # The first map may show only a corner of the building. So an older sheet may still turn out to
-    # be that of the building, as long as no room in use is kept.
+    # The first map may show only a corner of the building. So an older sheet may turn out to show
+    # this building, as long as no room in use is kept.
     others = [each for each in book.sheets if each.frame == frame and each is not in_use]
     alike = [(_alike(each, found), each) for each in others if each.is_named or in_use is None]
     share, best = max(alike, key=lambda each: each[0], default=(0.0, None))

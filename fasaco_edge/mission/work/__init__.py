@@ -1,1 +1,1 @@
-"""Work of an order: what is left of it, which part comes next, and how it ends."""
+"""Work of an order: the cells left, the part that comes next, and the end of the order."""

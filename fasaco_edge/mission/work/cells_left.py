@@ -26,7 +26,7 @@ from fasaco_edge.planners.passes import Covers, edge_cells, wanted_by
 
 @dataclass(slots=True, eq=False)
 class CellsLeft:
-    """Derives the cells left from map, ledger, company and order; owns nothing."""
+    """Derives the cells left from map, ledger, company and order."""
 
     _config: MissionConfig
     _map: MapState
@@ -68,7 +68,7 @@ class CellsLeft:
 
     @property
     def frontier_cells(self) -> int:
-        """Number of reachable ordered cells that border on unknown cells of the map."""
+        """Number of reachable cells of the order that border on unknown cells of the map."""
         area = self._map.area
         if area is None:
             return 0
@@ -78,7 +78,7 @@ class CellsLeft:
         """Return the cells from which to look beyond the map, the nearest to ``cell`` first.
 
         They border on unknown cells, and were covered before a restart: a mapper that began anew
-        may show less than the map did then.
+        may show less than the map before.
         """
         area = self._map.area
         if area is None or self._ledger.before is None:

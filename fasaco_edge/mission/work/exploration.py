@@ -101,7 +101,7 @@ class Exploration:
         Args:
             zone: the zone.
             area: the reachable area.
-            free: the part of it that is reachable past the robots now in the way.
+            free: the part of ``area`` reachable past robots that are in the way.
             cell: the robot's cell.
         """
         self.is_shut = False

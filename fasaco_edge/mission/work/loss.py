@@ -15,7 +15,7 @@ from fasaco_edge.mission.orders.zones import in_zones
 
 
 def check_loss(command: str, zones: tuple[Zone, ...], ledger: MissionLedger, on: MapState) -> None:
-    """Refuse a command that would forget covered cells in zones; without a map, in any place.
+    """Refuse a command that would forget covered cells in zones; without a map, anywhere.
 
     Cells under the tool stay covered, and do not count.
 

@@ -42,7 +42,7 @@ class OrderProgress:
         frame: frame of the map that zones, keep-out zones and home were given for; "" while no
             frame is in use.
         places: which map the places of the configuration belong to.
-        keep_out: keep-outs of the operator, under any order.
+        keep_out: keep-outs of the operator, which apply to any order.
         reached: cells that have been reachable since the order began; set only in the ledger's
             file, None in a mission.
         spent_s: the robot's time since the order began, if it has a limit [s].
@@ -90,7 +90,7 @@ class OrderProgress:
 
     @property
     def speed_m_s(self) -> float | None:
-        """Speed to drive at [m/s]; None for the robot's usual one."""
+        """Speed to drive at [m/s]; None for the robot's usual speed."""
         zone = self.current_zone
         return None if zone is None or self.errand else zone.kind(self.pass_number).speed_m_s
 

@@ -36,7 +36,7 @@ class OrderReach:
         self._cut_off: CellsOn | None = None
 
     def begin_order(self, reached: ReachedCells | None) -> None:
-        """Start another order, or continue one with the cells reached before a restart."""
+        """Start another order, or continue an order with the cells reached before a restart."""
         self._newest = None
         self.reached = None if reached is None else (reached.window, reached.mask)
         self._cut_off = None
@@ -82,9 +82,9 @@ class OrderReach:
             self._cut_off = window, lost | still
 
     def move(self, before: CellsOn | None, motion: Motion) -> None:
-        """Move the cells with the map; drop cells noted since it moved, as their pose was old.
+        """Move the cells with the map; drop cells recorded since then, as their pose was old.
 
-        ``before``: the cells before it moved.
+        ``before``: the cells before the map moved.
         """
         if before is not None and not motion.is_still:
             lattice = self._map.ground.lattice
@@ -100,7 +100,7 @@ class OrderReach:
             self._have_moved, self._cut_off = True, None
 
     def around(self, window: Window) -> Window:
-        """Return the window around all maps received; around the newest alone if too large."""
+        """Return the window around all maps received; around the newest map alone if too large."""
         whole = Window.around(window, None if self.reached is None else self.reached[0])
         assert whole is not None
         return whole if whole.rows * whole.cols <= MAX_LATTICE_CELLS else window

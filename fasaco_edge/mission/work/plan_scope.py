@@ -28,7 +28,7 @@ PRICE = 20.0
 
 
 class PlanScope:
-    """Poses the planning problems of an order; each covers only what comes first. Times are [s].
+    """Poses the planning problems of an order, for the cells planned first. Times are [s].
 
     Attributes:
         worth: which cells are planned first, by priority.
@@ -128,7 +128,7 @@ class PlanScope:
         return self.worth.puts_other_first(open_cells, area.lattice.window, ahead_s)
 
     def begin_pass(self) -> None:
-        """Choose anew what comes first."""
+        """Choose again which floor comes first."""
         self.worth.begin_pass()
         self._room.begin_pass()
 
@@ -168,7 +168,7 @@ class PlanScope:
 
     @property
     def is_part(self) -> bool:
-        """Whether other cells are left than those planned now."""
+        """Whether cells are left besides those planned now."""
         first, left = self._counts() if self._has_first else (0, 0)
         return left > first
 

@@ -56,7 +56,7 @@ class PresentPart:
         # Number of cells done at the last path's end (-1 before the first path), and number of
         # paths in a row that did not increase it.
         self._done, self._in_vain = -1, 0
-        # Whether the next plan begins a pass with other lanes than the pass before.
+        # Whether the next plan begins a pass with other lanes than the previous pass.
         self._has_new_lanes = False
         self.cells = CellsLeft(config, map_state, ledger, company, order)
         self.scope = PlanScope(
@@ -64,7 +64,7 @@ class PresentPart:
         )
 
     def begin_order(self) -> None:
-        """Forget the viewpoints of the previous order, and what it tried in vain."""
+        """Forget the viewpoints of the previous order, and the cells that it tried in vain."""
         self._order.exploration, self._has_new_lanes = Exploration(), False
         self.try_all()
         self.scope.begin_pass()
@@ -110,7 +110,7 @@ class PresentPart:
         assert area is not None
         self._order.exploration.end_if_reached(self._order.state.current_zone, area)
         problem = self.scope.problem(cell, before, home, attempt)
-        # A repair would keep the lanes of the pass before.
+        # A repair would keep the lanes of the previous pass.
         is_full, self._has_new_lanes = self._has_new_lanes, False
         return replace(problem, is_full=is_full)
 

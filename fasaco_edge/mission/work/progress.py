@@ -25,7 +25,7 @@ class ZoneProgress:
     Attributes:
         name: name of the zone.
         passes: number of passes ordered.
-        newest_pass: its number; 0 before the first.
+        newest_pass: number of the newest pass; 0 before the first.
         cells: number of its reachable cells.
         covered: number of these cells that are covered in that pass.
     """

@@ -16,10 +16,10 @@ NONE = -1
 
 
 class RoomInTurn:
-    """Chooses a room: the robot's own, or else the nearest one with floor left.
+    """Chooses a room: the robot's own, or else the nearest room with floor left.
 
-    It stays chosen until none of its floor is left, or until a new room turns out to be around the
-    robot: rooms are known only some time after they were seen. Floor in no room is room 0.
+    The room stays chosen until none of its floor is left, or until the robot turns out to be in a
+    new room: rooms are known only some time after they were seen. Floor in no room is room 0.
 
     Args:
         cells: the room of each cell.
@@ -61,7 +61,7 @@ class RoomInTurn:
         return self._on(lattice) is not self._seen
 
     def choose(self, cells: NDArray[np.bool_], area: ReachableArea, cell: Cell) -> bool:
-        """Choose the room that the next plan covers, see ``first``; return whether it is another.
+        """Choose the room that the next plan covers, see ``first``; return whether it has changed.
 
         Args:
             cells: the reachable cells to cover, bool (rows, cols) of the area.
@@ -93,7 +93,7 @@ class RoomInTurn:
 
 
 def _nearest(cells: NDArray[np.bool_], to: Cell) -> Cell:
-    """Return the marked cell that is nearest in rows and columns together; array indices."""
+    """Return the marked cell nearest to a cell by rows plus columns; both are array indices."""
     found = np.argwhere(cells)
     row, col = found[np.abs(found - to).sum(axis=1).argmin()].tolist()
     return row, col

@@ -57,7 +57,6 @@ class Sequencer:
         self.reach, self.uncovered = part.reach, part.uncovered
         # Whether floor opens while the robot is on its way home.
         self._left_behind = LeftBehind()
-        # Time of the next retry [s]; None for none.
         self._retry_at: float | None = None
         self.ending = CARRIED_OUT
         # Returns the swept floor as text for an order's end.
@@ -265,7 +264,7 @@ class Sequencer:
     def _is_worth_trying(self) -> bool:
         """Return whether a retry is worthwhile; recomputed if anything changed.
 
-        Temporarily closed floor makes it worthwhile: the obstacle may leave.
+        Temporarily closed floor makes a retry worthwhile: the obstacle may leave.
         """
         closed = self._map.obstacles.closed
         key = (self._map.area, self._ledger.version, closed)

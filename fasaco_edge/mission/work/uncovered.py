@@ -41,7 +41,7 @@ REASONS = {
     Cause.KEPT_OUT: "in a keep-out zone",
     Cause.BEHIND_KEEP_OUT: "closed off by a keep-out zone",
     Cause.BEHIND_OBSTACLES: "closed off by obstacles",
-    # The reason may be an obstacle, a wall that has moved, or one drawn thicker by a pixel.
+    # The reason may be an obstacle, a wall that has moved, or a wall drawn a pixel thicker.
     Cause.CLOSED: "no longer free on the map",
     Cause.UNKNOWN: "unknown to the map",
 }
@@ -54,7 +54,7 @@ class UncoveredArea:
 
     Attributes:
         cells: number of cells.
-        cell: one of them, (row, col) on the lattice.
+        cell: a cell of the area, (row, col) on the lattice.
         reason: why they stay uncovered.
     """
 
@@ -82,7 +82,7 @@ def viewpoints_beside(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -
     """Return a reachable cell beside each closed area, to look at it; array indices.
 
     Areas without a square of two by two cells are left out, as single rows of cells along walls are
-    noise of the map. At most MOST_VIEWPOINTS, for the largest areas.
+    noise of the map. There are at most MOST_VIEWPOINTS, for the largest areas.
     """
     areas = find_areas(closed.view(np.uint8))
     beside = cells_beside(areas, reachable)
@@ -135,8 +135,8 @@ class UncoveredCells:
     def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
         """Return the size of an area, and of all cells that were ever reachable [m2].
 
-        Covered cells count as ever reachable: after a restart no others are known. Cells unknown on
-        the present map do not count: the mapper may have been restarted.
+        Covered cells count as ever reachable: after a restart no other cells are known. Cells
+        unknown on the present map do not count: the mapper may have been restarted.
         """
         once = self._reach.known(area.lattice) | (self._ledger.visits(area.lattice.window) > 0)
         once &= area.lattice.states != UNKNOWN
@@ -165,10 +165,10 @@ class UncoveredCells:
         causes = np.full(left.shape, Cause.UNKNOWN, np.uint8)
         causes[lattice.window.slices_in(whole)] = self._causes(order, area)
         counts = np.bincount(causes[left], minlength=len(Cause) + 1)[1:]
-        order_of = np.argsort(-counts, kind="stable")
+        by_size = np.argsort(-counts, kind="stable")
         why = [
             f"{self._reason(Cause(n + 1))} ({counts[n] * cell_m2:.1f} m2)"
-            for n in order_of.tolist()
+            for n in by_size.tolist()
             if counts[n]
         ]
         return f"{ending}: {', '.join(why)}" if why else ending

@@ -39,7 +39,7 @@ def room_priorities(
 
 
 def least_priority(counts: NDArray[np.int64], cell_s: float, may_work_s: float) -> int:
-    """Return the lowest priority that is planned first; 0 if all floor is.
+    """Return the lowest priority that is planned first; 0 if all floor is planned.
 
     Args:
         counts: int64 (101,), number of cells of each priority.
@@ -70,7 +70,7 @@ class WorthFirst:
         zone: Callable[[], Zone | None],
         frame: Callable[[], str],
     ) -> None:
-        """Start without a limit; ``zone`` returns the zone being covered, ``frame`` the map's."""
+        """Start without a limit; ``zone`` returns the present zone, ``frame`` the map's frame."""
         self.least = 0
         self.may_work_s = float("inf")
         self.given: OccupancyGrid | None = None
@@ -176,7 +176,7 @@ class WorthFirst:
 
     def _given_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int8]:
         if self._on_cells is None or self._on_cells[0] != window:
-            # In blocks of rows, as coordinates take far more memory than cells.
+            # Computed in blocks of rows, as coordinates take far more memory than cells.
             on_cells = np.empty((window.rows, window.cols), np.int8)
             for part in window.strips(BLOCK):
                 values = given.geometry.values_at(given.cells, centres(part, self._cell_m), -1)

@@ -95,7 +95,7 @@ def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
 
 
 def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
-    """Return points [m], float64 (n, 2), as a line; an empty one for fewer than two points.
+    """Return points [m], float64 (n, 2), as a line; an empty line for fewer than two points.
 
     ``style_archetype`` has its colour and width, which are logged once.
     """

@@ -1,7 +1,7 @@
 """Curves of a recording: the table of all figures over time, each drawn only when it changes.
 
-Each flush, once a second, begins a chunk for each entity drawn since the last one: an entity drawn
-once a second takes five megabytes an hour, whatever its content.
+Each flush, once a second, begins a chunk for each entity drawn since the last flush: an entity
+drawn once a second takes five megabytes an hour, whatever its content.
 """
 
 from __future__ import annotations
@@ -105,9 +105,9 @@ OF_STATUS: tuple[Curve[Status], ...] = (
     Curve("metrics/plan/line_gap", lambda s: s.path.line_gap if s.path else None,
           GAP, "gap of the line", GREEN, NOISE),
     # 0 means unknown.
-    Curve(entities.DAEMON_MEMORY, lambda s: s.rss_mb or None, MEMORY, "planner MB", VIOLET, NOISE),
+    Curve(entities.DAEMON_MEMORY, lambda s: s.rss_mb or None, MEMORY, "daemon MB", VIOLET, NOISE),
     Curve("metrics/resources/processor", lambda s: 100 * s.cpu_s,
-          USED, "planner %", ORANGE, NOISE, over=lambda s: s.uptime_s),
+          USED, "daemon %", ORANGE, NOISE, over=lambda s: s.uptime_s),
     Curve("metrics/resources/battery", _battery, USED, "battery %", GREEN, BATTERY_NOISE),
 )  # fmt: skip
 OF_PATH: tuple[Curve[PathAttachment], ...] = (
@@ -163,7 +163,7 @@ class Curves:
                 self.draw(curve.entity, value, curve.noise, curve.spacing_ns)
 
     def draw(self, entity: str, value: float, noise: float = 0.0, spacing_ns: int = 0) -> None:
-        """Draw ``value`` if it differs from the last one drawn; see ``Curve`` for the others."""
+        """Draw ``value`` if it differs from the last drawn value; see ``Curve`` for the others."""
         now_ns = self._writer.wall_ns
         curve = self._drawn.get(entity)
         if curve is None:

@@ -35,8 +35,8 @@ class RunDescription:
     Attributes:
         robot: name of the robot.
         began: beginning of the recording, UTC, as text.
-        version: version of the planner; "" while unknown.
-        config: configuration in the planner's status.
+        version: version of the daemon; "" while unknown.
+        config: configuration in the daemon's status.
         anchor: point (x, y) [m] of the map frame that is drawn at 0; None for the origin.
         outcome: outcome of the mission so far.
     """
@@ -50,7 +50,6 @@ class RunDescription:
 
     @property
     def name(self) -> str:
-        """The name of the run."""
         return f"{self.robot} {self.began}"
 
     def markdown(self) -> str:

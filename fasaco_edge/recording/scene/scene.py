@@ -65,7 +65,6 @@ class Scene:
         self._draw_robot(DEFAULT_RADIUS_M)
 
     def add_map(self, grid: OccupancyGrid) -> None:
-        """Draw the map."""
         self._draw_grid(self._anchored(grid.geometry.origin).grid(grid))
 
     def _draw_grid(self, grid: OccupancyGrid) -> None:
@@ -126,7 +125,7 @@ class Scene:
         if self._comes_again(entities.FLOOR, grid.geometry, grid.cells):
             return
         grid = self._anchored(grid.geometry.origin).grid(grid)
-        # With four bytes a pixel, it is twice as large after compression.
+        # With four bytes a pixel, the layer is twice as large after compression.
         size, drawn = 2 * size_in_file(grid.cells), 4 * grid.cells.size
         self._draw(entities.FLOOR, size, lambda: draw.floor_archetype(grid), drawn)
 
@@ -141,7 +140,7 @@ class Scene:
         self._curves.add(OF_PHEROMONE, message)
 
     def add_status(self, status: Status) -> None:
-        """Plot the planner's figures, show its states, log its errors."""
+        """Plot the daemon's figures, show its states, log its errors."""
         self._curves.add(OF_STATUS, status)
         self._outcome.add_status(status)
         self._add_configuration(status)
@@ -154,7 +153,7 @@ class Scene:
             self.add_line(entities.MISSION_LOG, text, "WARN" if tone == BAD else "INFO")
         self._status = status
         errors = status.errors
-        # The count falls when the planner restarts.
+        # The count falls when the daemon restarts.
         if errors.total > self._errors:
             last = errors.last or "no text"
             self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
@@ -177,7 +176,6 @@ class Scene:
             self.add_line(log, f"{state}: {reason}")
 
     def add_line(self, log: str, message: str, level: str = "INFO") -> None:
-        """Add a line to a log."""
         self._writer.log(log, rr.TextLog(message, level=level))
 
     def catch_up(self) -> None:

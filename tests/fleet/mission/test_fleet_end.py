@@ -268,7 +268,7 @@ def test_a_robot_replans_once_others_swept_its_first_floor():
     ours.tell(replace(report, tiles=swept))
     for _ in range(3):
         ours.tick()
-    assert "others have swept what lay ahead" in [each.reason for each in ours.updates]
+    assert "others have swept the floor ahead" in [each.reason for each in ours.updates]
     assert ours.mission.orders.scope.worth.least == 0
 
 
