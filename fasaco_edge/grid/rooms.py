@@ -198,12 +198,12 @@ def _by_hand(cuts: Sequence[tuple[Point, Point]], geometry: GridGeometry) -> NDA
 def _joined(
     doors: NDArray[np.float64], beside: NDArray[np.int32], sizes: NDArray[np.float64]
 ) -> NDArray[np.int32]:
-    """Return the room of each region, int32 (n,), 0 for none, with small ones joined to others.
+    """Return the room of each region, int32 (n,), 0 for none; small ones join a neighbour's room.
 
     Args:
         doors: float64 (m, 5), see ``find_doors``.
         beside: int32 (m, 2), the regions on both sides of each door.
-        sizes: float64 (n,), free floor of each region [m2]; that of region 0 has no meaning.
+        sizes: float64 (n,), free floor of each region [m2]; entry 0 has no meaning.
     """
     downs, rights = doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1]
     squares = downs * downs + rights * rights

@@ -108,7 +108,7 @@ class Plan:
         return f"<Plan {self.map.name}, {self.path.planner}: {', '.join(words)}>"
 
     def _repr_png_(self) -> bytes:
-        """Return the picture as PNG, as notebooks show it."""
+        """Return the picture as PNG, for notebooks."""
         return png_of(self.plot())
 
     @property
@@ -140,12 +140,12 @@ class Plan:
 
     @property
     def cost_s(self) -> float:
-        """Time to drive and turn along the walk's cells [s]; of the line: ``drive.seconds``."""
+        """Time to drive and turn along the walk's cells [s]; the line has ``drive.seconds``."""
         return self.path.cost_s
 
     @property
     def gap(self) -> float | None:
-        """Optimality gap of ``cost_s``, as a share; None if unknown. Of the line: ``drive.gap``."""
+        """Optimality gap of ``cost_s``, as a share; None if unknown. The line has ``drive.gap``."""
         return self.path.gap
 
     @cached_property

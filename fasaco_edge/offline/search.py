@@ -4,8 +4,8 @@ A line is laid along each of two walks and annealed three times; then the better
 until the budget ends. The first walk and line are always completed, unless Ctrl-C cuts them. The
 steps do not depend on the budget, so a larger budget never gives a worse line (by its seconds, plus
 the price of unswept floor). If a share of the floor is requested, the first line is always annealed
-three times, to find the price of floor. A planner without local search gives one walk, until the
-budget ends.
+three times, to find the price of floor. A planner without local search searches for one walk until
+the budget ends.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class SearchEnd:
         bound: see below.
 
     Attributes:
-        by: what ended them.
+        by: what ended the searches.
         bound: the problem's lower bound, for planners that do not compute it.
         is_walk_limited: whether the limit on proposals ended the last search for a walk.
         is_walk_cut: whether ``budget`` or ``stop`` ended it.

@@ -88,9 +88,9 @@ class Interrupt:
 
 @dataclass(slots=True)
 class StopRecorder:
-    """Asks another criterion, and records at which calls it stops; ``StopAt`` stops at the same.
+    """Passes on what another criterion decides, and records the calls that stop, for ``StopAt``.
 
-    A path's work does not reproduce it: a repair and the search after it may both stop.
+    Counts of work do not reproduce such a path: a repair and the search after it may both stop.
 
     Attributes:
         criterion: the criterion asked.

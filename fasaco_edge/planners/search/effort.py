@@ -9,7 +9,7 @@ import numpy as np
 from fasaco_edge.kernels.local_search.perturbation import PerturbationRules
 from fasaco_edge.planners.cost import CoverageCost
 
-# Temperatures of an annealing: from 1.5 down to 0.2.
+# Temperatures of an annealing, from 1.5 down to 0.2, in the unit of ``effort_for``.
 LEVELS = tuple(1.5 * (0.2 / 1.5) ** (level / 15) for level in range(16))
 
 WHOLE_WALK = -1

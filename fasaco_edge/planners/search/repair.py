@@ -34,7 +34,7 @@ from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_
 PERTURBATIONS_AT_ONCE = 8
 # Limit on the perturbations of a neighbourhood, in case no move can be proposed in it.
 MOST_PERTURBATIONS = 100
-# Proposals of a second repair, for the path ahead, as a share of those of the first.
+# Proposals of a second repair, for the path ahead, as a share of the first repair's.
 FEW = 0.2
 
 # Attempts to improve a valid walk: stride between the first spots of two attempts; approximate
@@ -188,7 +188,6 @@ class _Repair:
             yield
 
     def _is_proven(self) -> bool:
-        """Return whether the walk is proven optimal."""
         if self._bound is None:
             return False
         progress = self.progress()
