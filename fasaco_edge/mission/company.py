@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     # For types only: an idle daemon loads no kernels.
     from fasaco_edge.grid.lattice import Cell
     from fasaco_edge.grid.reachable_area import ReachableArea
-    from fasaco_edge.mission.events import Doing, MemberReceived, State
+    from fasaco_edge.mission.events import Doing, MemberReceived
+    from fasaco_edge.states import State
 
 OpenCells = Callable[[Window], NDArray[np.bool_]]
 

@@ -29,6 +29,7 @@ from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.orders.zones import cells_inside, with_kept_out
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import RunData
+from fasaco_edge.states import Activity, states_of
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.rooms import RoomReport
 from fasaco_edge.wire.documents.settings import known_settings
@@ -36,7 +37,7 @@ from fasaco_edge.wire.documents.settings import known_settings
 MILESTONES = (50, 90, 99, 100)
 """Shares of the cells that are coverable at the end [percent]."""
 # States in which the robot is not at work.
-RESTS = ("idle", "done", "paused", "charging", "loading", "waiting for map", "waiting for pose")
+RESTS = states_of(Activity.NONE, Activity.HELD)
 
 
 def visits_of(

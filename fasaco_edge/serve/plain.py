@@ -8,30 +8,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from fasaco_edge.states import row_of
 from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport
 from fasaco_edge.wire.documents.status import Status
 
-WORDS = {
-    "idle": "ready",
-    "waiting for map": "starting",
-    "waiting for pose": "starting",
-    "loading": "starting",
-    "covering": "sweeping",
-    "returning": "driving home",
-    "blocked": "waiting",
-    "degraded": "needs help",
-}
-"""One word for each state whose own name is not plain."""
-DOES = {
-    "idle": "Ready to sweep",
-    "no map": "Ready, but has no map of the rooms yet",
-    "waiting for map": "Waits for its map of the rooms",
-    "waiting for pose": "Finds out where it is",
-    "loading": "Starts up",
-    "planning": "Plans its way",
-    "done": "Done",
-    "blocked": "Cannot go on just now",
-}
+NO_MAP = "Ready, but has no map of the rooms yet"
 STUCK = "Something blocks its way: open doors and clear the floor. It tries again by itself."
 UNKNOWN_ROOM = (
     "It knows no room of that name yet. Tap the room on the map and name it, or end the work."
@@ -109,14 +90,19 @@ LEAST_M2 = 0.05
 NEAR_M = 0.5
 
 
+def word(state: str) -> str:
+    """Return one word for a state."""
+    return row_of(state).word or state
+
+
 def does(status: Status) -> str:
     """Return what the robot does now, in the owner's words."""
     mission, path = status.mission, status.path
     if status.state == "blocked" and mission.waits_for_room:
         return f"Waits for {mission.waits_for_room}"
-    state = "no map" if status.state == "idle" and status.map is None else status.state
-    if state in DOES:
-        return DOES[state]
+    has_no_map = status.state == "idle" and status.map is None
+    if words := NO_MAP if has_no_map else row_of(status.state).does:
+        return words
     if status.state == "paused":
         return "Paused at home" if _is_home(status) else "Paused: waits for Resume"
     if status.state == "charging":
@@ -126,6 +112,14 @@ def does(status: Status) -> str:
         is_to_charge = status.battery is not None and status.battery.goes_on_at is not None
         return "Drives to its dock to charge" if is_to_charge else "Drives home"
     return _sweeps(status) if path is None or path.steps else "Waits a moment"
+
+
+def look(status: Status) -> str:
+    """Return the class of the state in the page's style sheet: bad, wait, go or ""."""
+    row = row_of(status.state)
+    if status.troubles or row.needs_help:
+        return "bad"
+    return {"grey": "", "amber": "wait"}.get(row.colour, "go")
 
 
 def last_seen(status: Status) -> str:

@@ -11,8 +11,9 @@ from rich.text import Text
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client import phrases
 from fasaco_edge.client.feed import Feed
-from fasaco_edge.client.phrases import TROUBLED, age, clock
+from fasaco_edge.client.phrases import age, clock
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.states import TROUBLED
 from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.glyphs import FAINT, ScreenBlocks, with_keys

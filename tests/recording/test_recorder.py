@@ -114,7 +114,7 @@ def test_everything_on_the_bus_becomes_an_entity(recorded):
     assert 2 < rows[entities.PHEROMONE] <= recorded.mission.revision
     assert rows[entities.ROBOT] == FRAMES
     assert rows[entities.FLOOR] == FRAMES // 4
-    assert {entities.MAP, entities.DRIVEN_PATH, f"{entities.LATENCY}/plan"} <= set(rows)
+    assert {entities.MAP, entities.DRIVEN_PATH, "metrics/latency/plan"} <= set(rows)
     assert recorded.summary.timelines == (entities.REPLAN, entities.WALL_CLOCK)
     assert 0.9 * FRAMES * FRAME_S < recorded.summary.duration_s < 300
 
@@ -178,10 +178,9 @@ def test_paths_are_logged_and_their_numbers_are_curves(recorded):
     # All came within a minute, for one reason: of them the layout shows the first.
     levels = read_column(recorded.path, entities.PATH_LOG, "TextLog:level").values
     assert levels == [["INFO"], ["INFO"], *[["DEBUG"]] * (revision - 2)]
-    assert len(read_column(recorded.path, entities.GAP, SCALAR).values) == revision
-    assert {
-        value for (value,) in read_column(recorded.path, entities.PROCESSOR, SCALAR).values
-    } == {20}
+    assert len(read_column(recorded.path, "metrics/plan/gap", SCALAR).values) == revision
+    processor = read_column(recorded.path, "metrics/resources/processor", SCALAR).values
+    assert {value for (value,) in processor} == {20}
 
 
 def test_the_robot_and_the_ends_of_its_track_are_drawn(recorded):

@@ -24,6 +24,7 @@ from fasaco_edge.cli.demo.view import demo_view
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.addresses import free_port
 from fasaco_edge.host.processes import python_program
+from fasaco_edge.states import AT_WORK
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import Status
@@ -35,7 +36,6 @@ RECORDERS_WITHIN_S = 60.0
 SETTLE_SIM_S = 3.0
 # Names of the logs of programs that end after the robots, as these programs record them.
 LAST = ("daemon", "fleet")
-AT_WORK = ("planning", "covering", "degraded")
 
 
 @dataclass(frozen=True, slots=True)

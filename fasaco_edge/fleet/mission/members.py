@@ -17,7 +17,8 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.events import MemberReceived, State
+from fasaco_edge.mission.events import MemberReceived
+from fasaco_edge.states import AT_WORK
 
 # Timeouts of a silent robot, and of a robot at work that does not move [s]; least motion [m].
 GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
@@ -27,7 +28,6 @@ LEFT_M = 0.2
 
 # ``Member.absence`` of a silent robot.
 GONE = "gone"
-AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
 
 
 @dataclass(slots=True)

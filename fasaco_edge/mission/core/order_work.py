@@ -8,8 +8,9 @@ from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.errands import NO_WAY, Errands
 from fasaco_edge.mission.core.parts import MissionParts
-from fasaco_edge.mission.events import Doing, State
+from fasaco_edge.mission.events import Doing
 from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.states import State
 
 
 class OrderWork:

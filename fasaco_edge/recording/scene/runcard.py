@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.states import AT_WORK, TROUBLED
 from fasaco_edge.text import duration, one_line
 from fasaco_edge.wire.documents.json_text import Settings
 from fasaco_edge.wire.documents.settings import known_settings
@@ -94,7 +95,7 @@ def cells_of(status: Status) -> tuple[int, int] | None:
 
 
 # States without an outcome.
-UNDER_WAY = ("planning", "covering")
+UNDER_WAY = AT_WORK - TROUBLED
 
 
 class Outcome:

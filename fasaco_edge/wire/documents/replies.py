@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.states import State
 from fasaco_edge.wire.documents.json_text import (
     Amount,
     Corners,
@@ -19,11 +20,8 @@ from fasaco_edge.wire.documents.json_text import (
     encode_json,
 )
 
-STATES: Final = (
-    *("idle", "waiting for map", "waiting for pose", "loading", "planning", "covering"),
-    *("returning", "charging", "paused", "blocked", "degraded", "done"),
-)
-State = Annotated[str, allowed(enum=STATES)]
+STATES: Final = tuple(state.value for state in State)
+StateName = Annotated[str, allowed(enum=STATES)]
 TROUBLES: Final = (
     *("not_begun", "no_pose", "pose_jumped", "no_map", "no_battery", "no_dock", "no_current"),
     *("shut_in", "blocked", "stands", "beside_line", "two_publishers", "no_effect"),
@@ -224,7 +222,7 @@ class Reply(Document, frozen=True):
     """The reply to an accepted command."""
 
     robot: Name = ""
-    state: State = ""
+    state: StateName = ""
     reason: str = ""
     coverage: CoverageReport | None = None
     floor: FloorReport | None = None

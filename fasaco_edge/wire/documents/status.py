@@ -28,7 +28,7 @@ from fasaco_edge.wire.documents.replies import (
     FloorReport,
     MissionReport,
     Point,
-    State,
+    StateName,
     TroubleReport,
 )
 
@@ -304,7 +304,7 @@ class Status(Document, frozen=True):
 
     robot: Name = ""
     version: str = ""
-    state: State = ""
+    state: StateName = ""
     reason: str = ""
     claim: ClaimReport = ClaimReport()
     uptime_s: Amount = 0.0
