@@ -41,50 +41,25 @@ class Company:
         """Take in another robot's message; return why it requires a plan, or ""."""
         return ""
 
-    def forget_ground(self) -> None:
-        """Forget the ground of others: it belongs to another map."""
-
     def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
         """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
 
         Args:
-            open_cells: mask function: a window to the cells that still need a visit.
+            open_cells: mask function: a window to the cells that still need a visit, without
+                those that this robot has given up.
             cell: this robot's cell.
             now: time [s].
             at_once: whether this robot is out of work.
         """
         return ""
 
-    def mine(
-        self,
-        cells: NDArray[np.bool_],
-        area: ReachableArea,
-        unvisited: NDArray[np.bool_] | None = None,
-    ) -> NDArray[np.bool_]:
-        """Return which cells are this robot's to visit.
+    def part(self, left: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_] | None:
+        """Return this robot's part of an area, bool (rows, cols); None if no others have a part.
 
-        Given the ``unvisited`` ones among them: those on which it sweeps the floor, visited or not.
-        """
-        return cells
-
-    def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_] | None:
-        """Leave this robot's part of cells tried in vain to the others, also after new maps.
-
-        Returns:
-            The cells that this robot has not given up; None if no others are at work.
+        ``left``: the cells that need a visit. Once this robot's part has none of them in reach, and
+        the others make no progress, the whole area is its part.
         """
         return None
-
-    def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> bool:
-        """Leave this robot's part of cells that it cannot reach to the others, until the next map.
-
-        Returns:
-            Whether there were any; False if no others are at work.
-        """
-        return False
-
-    def try_again(self) -> None:
-        """Clear the list of cells given up."""
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
