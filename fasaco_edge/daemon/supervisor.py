@@ -79,7 +79,9 @@ class RecorderSupervisor:
             with open(os.memfd_create("configuration"), "w+b") as document:
                 document.write(self._config)
                 document.seek(0)
-                self._process = subprocess.Popen(self._command, stdin=document)
+                # A process group of its own keeps Ctrl-C away: the recorder ends after the daemon's
+                # last messages.
+                self._process = subprocess.Popen(self._command, stdin=document, process_group=0)
         except OSError as error:
             self._process, self._death = None, f"could not be started: {error.strerror}"
 

@@ -24,6 +24,7 @@ from fasaco_edge.offline.figures import (
     curve_words,
     floor_document,
     floor_words,
+    gap_words,
     judged_floor,
 )
 from fasaco_edge.offline.ground import Line, PlanGround
@@ -103,9 +104,10 @@ class Plan:
         if floor is not None and floor.swept_share is not None:
             words[0] = f"{percent(floor.swept_share)} of {floor.reachable_m2:,.1f} m2 swept"
         words.append(f"{drive.turns:,.0f} quarter-turns")
-        if drive.gap is not None:
-            words.append(f"at most {100 * drive.gap:.0f} % above the shortest time")
-        return f"<Plan {self.map.name}, {self.path.planner}: {', '.join(words)}>"
+        if floor is not None and floor.gap is not None:
+            words.append(gap_words(floor.seconds, floor.gap))
+        above = above_bound(self.path) if floor is None else ""
+        return f"<Plan {self.map.name}, {self.path.planner}: {', '.join(words)}{above}>"
 
     def _repr_png_(self) -> bytes:
         """Return the picture as PNG, for notebooks."""

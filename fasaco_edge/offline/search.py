@@ -26,7 +26,6 @@ from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
     ColonySnapshot,
     CoveragePlanner,
-    Interrupt,
     Observer,
     SearchProgress,
     StoppingCriterion,
@@ -93,12 +92,12 @@ class SearchEnd:
         return self.is_walk_limited
 
     def is_interrupted(self) -> bool:
-        """Return whether the user ends the plan, even within the first stage of the first line."""
+        """Return whether ``stop`` ends the plan even within the first stage of the first line."""
         if self._progress is not None:
             self._watch(self._progress)
-        asked = isinstance(self._stop, Interrupt) and self._stop.asked.is_set()
-        self.by = "Ctrl-C" if asked else self.by
-        return asked
+        is_cut = bool(getattr(self._stop, "cuts_first_line", False))
+        self.by = "Ctrl-C" if is_cut else self.by
+        return is_cut
 
     def is_stopped(self) -> bool:
         """Return whether ``stop`` ends the search for the first line, which has no budget."""

@@ -46,7 +46,8 @@ class SearchProgress:
 
 
 # Called repeatedly while a search runs; True ends it with the best walk so far, which always
-# exists.
+# exists. A plan completes its first line all the same, unless a criterion has an attribute
+# ``cuts_first_line`` that is true.
 StoppingCriterion = Callable[[SearchProgress], bool]
 
 
@@ -83,6 +84,11 @@ class Interrupt:
     asked: threading.Event = field(default_factory=threading.Event)
 
     def __call__(self, progress: SearchProgress) -> bool:
+        return self.asked.is_set()
+
+    @property
+    def cuts_first_line(self) -> bool:
+        """Whether it stops a plan even before its first line is complete."""
         return self.asked.is_set()
 
 

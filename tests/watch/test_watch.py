@@ -184,6 +184,7 @@ def test_once_is_one_picture(covering):
     assert ended.code == 0
     assert "COVERING" in ended.out
     assert "of 234 cells" in ended.out
+    assert "q quits" not in ended.out
     assert "\x1b" not in ended.out
     ended = fasaco_edge("watch", "--once", "--json", "--connect", covering.endpoint)
     assert json.loads(ended.out)["state"] == "covering"

@@ -156,7 +156,7 @@ class GivingWay(Waiting):
             state = State.RETURNING
         elif state is not State.DONE and cell is not None:
             state = State.COVERING if order.is_open else State.DONE
-            if why := self._fleet.share(self._orders.cells.open_cells, cell, now):
+            if why := self._fleet.share(self._orders.cells.untried, cell, now):
                 self._route.requests.want(why)
         return Doing(state, self._reason, update)
 

@@ -69,19 +69,20 @@ class Member:
 
 
 class Members:
-    """Tracks the other robots; empty without a fleet.
+    """Tracks the other robots.
 
     Attributes:
         known: the others, by name.
         ground: the cells that the others can reach, except robots that are left out.
     """
 
-    def __init__(self, robot: str, ledger: MissionLedger, cell_m: float) -> None:
+    def __init__(self, ledger: MissionLedger, cell_m: float) -> None:
         self.known: dict[str, Member] = {}
         self.ground = SharedGround()
-        self._robot, self._ledger, self._cell_m = robot, ledger, cell_m
+        self._ledger, self._cell_m = ledger, cell_m
         # Places of robots that stand in the way [m], by name.
         self._avoided: dict[str, tuple[float, float]] = {}
+        self.shared.clears(self.ground.clear)
 
     def neighbours(self, now: float) -> dict[str, Neighbour]:
         """Return the other robots in this robot's frame, except silent robots.
@@ -176,8 +177,6 @@ class Members:
         Raises:
             FleetError: there is no room for its data.
         """
-        if not self._robot:
-            return ""
         before, frame = self.known.get(event.robot), self._ledger.current.frame
         left_out = event.misfit or self.shared.why_misplaced(frame)
         if not left_out and event.frame not in ("", frame):

@@ -88,4 +88,4 @@ def waits_for(mission: Mission) -> str:
     stands = mission.doing is State.COVERING and len(mission.route.path.ahead) < 2
     if name or not (stands and orders.part.waits_for_others):
         return name
-    return layer_of(mission).busiest(orders.cells.open_cells)
+    return layer_of(mission).busiest(orders.cells.untried)

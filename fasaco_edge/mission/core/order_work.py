@@ -65,7 +65,8 @@ class OrderWork:
             return self._stand_by(why, now)
         if self.line.left.open_missed():
             return None
-        if orders.part.pass_over_unreachable():
+        if area is not None and orders.cells.pass_over(area):
+            # Cells of others come before a retry.
             self.share(cell, now, at_once=True)
             return None
         return self._next_stage(cell, now)
@@ -102,7 +103,7 @@ class OrderWork:
         """Divide the remaining cells if due; return why a plan is wanted, or ""."""
         if self.orders.order_state.stage is Stage.RETURNING:
             return ""
-        return self.company.share(self.orders.cells.open_cells, cell, now, at_once=at_once)
+        return self.company.share(self.orders.cells.untried, cell, now, at_once=at_once)
 
     def _stand_by(self, reason: str, now: float) -> Doing:
         return Doing(State.COVERING, reason, self.route.stop(reason, now))
