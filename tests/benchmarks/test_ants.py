@@ -7,7 +7,7 @@ import pytest
 
 from tests.benchmarks.__main__ import main
 from tests.benchmarks.ants.benchmark import ratio
-from tests.benchmarks.ants.moments import KINDS, NONE, VARIANTS
+from tests.benchmarks.ants.moments import FIRST, FIRST_ANTS, KINDS, NONE, VARIANTS
 
 
 def test_moments_are_answered_with_and_without_ants(tmp_path, capsys):
@@ -26,6 +26,17 @@ def test_moments_are_answered_with_and_without_ants(tmp_path, capsys):
     repairs = [one["answers"] for one in replays if one["kind"] == KINDS[0]]
     assert any(one["living"]["ants"] for one in repairs)
     assert any(one["living"] != one["flat"] for one in repairs)
+
+
+def test_first_walks_by_ants_are_compared_with_simple_ones(capsys):
+    words = ["--first", "--maps", "flat", "--seeds", "1", "--json"]
+    assert main(["ants", *words]) == 0
+    first, *after = json.loads(capsys.readouterr().out)["replays"]
+    assert first["kind"] == FIRST
+    assert first["answers"]["new"]["ants"] == FIRST_ANTS
+    for one in after:
+        costs = [answer["cost_s"] for answer in one["answers"].values()]
+        assert max(costs) < first["answers"][NONE]["cost_s"]
 
 
 def test_errors_are_those_of_buildings():

@@ -20,9 +20,12 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
+from fasaco_edge.planners.grids import read_grid
 from tests.benchmarks.ants.moments import (
+    FIRST,
+    FIRST_BUDGETS_S,
+    FIRST_TURN,
     FLAT,
-    KINDS,
     LARGE,
     LARGE_CELLS,
     LIVING,
@@ -37,13 +40,14 @@ from tests.benchmarks.ants.moments import (
     measure,
     variants_of,
 )
-from tests.benchmarks.harness import within
+from tests.benchmarks.harness import check_names, within
 from tests.benchmarks.online.buildings import BuildingChoice
 
 DEFAULT_MAPS = ("flat", "office", "basement")
 GENERATED_CELLS = 1_000
-# Goals: cost with ants to without, where no windows are solved; share of ants in spare time.
-MOST_RATIO, LEAST_SHARE_OF_ANTS = 0.997, 1 / 3
+# Goals: cost of a variant to that without ants; share of ants in what spare time saves.
+GOALS = ((REPAIR, LIVING, 0.997), (LARGE, NEW, 0.997), (FIRST, NEW, 0.98))
+LEAST_SHARE_OF_ANTS = 1 / 3
 # Variants whose costs are compared.
 PAIRS = ((LIVING, NONE), (NEW, NONE), (FLAT, NONE), (LIVING, NEW), (LIVING, FLAT))
 
@@ -74,7 +78,7 @@ def ratio(parts: Sequence[tuple[str, float, float]]) -> Ratio | None:
 
 def _cost(replays: Sequence[Replay], one: str, other: str) -> Ratio | None:
     """Return the mean cost of one variant over that of another."""
-    answered = [each for each in replays if one in each.answers]
+    answered = [each for each in replays if {one, other} <= set(each.answers)]
     costs = ((each, each.answers[one].cost_s, each.answers[other].cost_s) for each in answered)
     return ratio([(each.place, this_s / that_s, 1.0) for each, this_s, that_s in costs])
 
@@ -93,7 +97,7 @@ def _saved_to_none(attempts: Sequence[Replay], variant: str) -> Ratio | None:
 
 def report(args: argparse.Namespace, replays: Sequence[Replay]) -> Report:
     """Sum up any number of moments, even none."""
-    kinds = [kind for kind in KINDS if any(one.kind == kind for one in replays)]
+    kinds = dict.fromkeys(one.kind for one in replays)
     by_kind = {kind: [one for one in replays if one.kind == kind] for kind in kinds}
     attempts = [one for one in replays if one.kind in {SPOT, REST}]
     spare = {kind: some for kind, some in by_kind.items() if kind in {SPOT, REST}}
@@ -112,7 +116,9 @@ def report(args: argparse.Namespace, replays: Sequence[Replay]) -> Report:
             "by building. Repairs end by themselves; an attempt takes the processor time that a "
             f"mission gives it, a search of a very large lattice {args.large_s:g} s.",
             "saved: on the present walk; taken: the same of attempts for which a mission changes "
-            "its path. by ants: their share of what is saved on the search's first walk.",
+            "its path. by ants: their share of what is saved on the search's first walk. first "
+            "walk: by the paper's colony, and by searches from it, over simple walks, and searches "
+            "from these.",
         ),
         further=(
             ResultTable(
@@ -121,6 +127,7 @@ def report(args: argparse.Namespace, replays: Sequence[Replay]) -> Report:
                 tuple(
                     (kind, *row)
                     for kind, some in (spare | {"all attempts": attempts}).items()
+                    if some
                     for row in _spare_rows(some)
                 ),
             ),
@@ -160,10 +167,10 @@ def _work_rows(kind: str, replays: Sequence[Replay]) -> Iterator[tuple[str, ...]
 
 
 def _goals(by_kind: dict[str, list[Replay]], attempts: Sequence[Replay]) -> Iterator[MeasuredGoal]:
-    for kind, variant in ((REPAIR, LIVING), (LARGE, NEW)):
+    for kind, variant, most in GOALS:
         if kind in by_kind:
             cost = _value(_cost(by_kind[kind], variant, NONE))
-            yield MeasuredGoal(f"{kind}: cost with ants to without", cost, MOST_RATIO)
+            yield MeasuredGoal(f"{kind}: cost with ants to without", cost, most)
     if attempts:
         least: tuple[tuple[str, Callable[[Sequence[Replay], str], Ratio | None], float], ...] = (
             ("share of ants", _share_of_ants, LEAST_SHARE_OF_ANTS),
@@ -187,14 +194,17 @@ def _names(args: argparse.Namespace) -> tuple[str, ...]:
 
 
 def _plan_of(args: argparse.Namespace) -> MomentsPlan:
+    names = _names(args)
+    check_names(names)
     return MomentsPlan(
-        choice=BuildingChoice(_names(args), args.generated, GENERATED_CELLS),
+        choice=BuildingChoice(() if args.first else names, args.generated, GENERATED_CELLS),
         missions=args.missions,
         most={REPAIR: args.moments, SPOT: args.moments, REST: args.rests},
         seeds=args.seeds,
         with_turns=args.cost == "turns",
         large=args.large,
         large_s=args.large_s,
+        first=[read_grid(name) for name in names] if args.first else (),
     )
 
 
@@ -203,8 +213,10 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Replay, None, None
 
 
 def _count(args: argparse.Namespace) -> int:
-    places = len(_names(args)) + args.generated
-    return int(args.seeds * (places * (2 * args.moments + args.rests) + args.large))
+    names = len(_names(args))
+    first, missions = (names, 0) if args.first else (0, names)
+    moments = (missions + args.generated) * (2 * args.moments + args.rests)
+    return int(args.seeds * (first * (1 + len(FIRST_BUDGETS_S)) + moments + args.large))
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -229,6 +241,11 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
             name, type=within(0, 1000), default=0, metavar="N", help=f"{what} (default: 0)"
         )
     parser.add_argument(
+        "--first", action="store_true",
+        help="first walks over known maps and grids, in place of missions there; a quarter-turn "
+        f"costs {FIRST_TURN:g} steps",
+    )  # fmt: skip
+    parser.add_argument(
         "--large-s", type=seconds_above_zero, default=20.0, metavar="S",
         help="processor time of a search of a very large lattice [s] (default: %(default)g)",
     )  # fmt: skip
@@ -249,5 +266,6 @@ examples:
   python -m tests.benchmarks ants
   python -m tests.benchmarks ants --maps flat office --generated 3 --seeds 4 --json
   python -m tests.benchmarks ants --large 2 --seeds 1
+  python -m tests.benchmarks ants --first --maps flat office --grids *.npy
 """,
 )

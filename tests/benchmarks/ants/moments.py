@@ -3,11 +3,13 @@
 A mission in an unknown building asks for repairs, and in spare time for a better path. Each of
 these problems is answered by ants on the mission's living trail, on a new trail (uniform at first),
 on a flat one (never changed), and without ants. So are searches of very large known buildings,
-where, as in repairs, no windows are solved by dynamic programming.
+where, as in repairs, no windows are solved by dynamic programming; and a colony's walk over a known
+building is compared with the simple walks that a search begins with.
 """
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,11 +24,16 @@ from fasaco_edge.mission.path.plan_requests import (
     most_s,
 )
 from fasaco_edge.planners.compiling import warm_up
-from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
-from fasaco_edge.planners.planner import StoppingCriterion, WorkLimit
-from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.cost import MICROSECONDS, CoverageCost, SearchWork
+from fasaco_edge.planners.grids import NamedGrid
+from fasaco_edge.planners.paper.baselines import first_walks
+from fasaco_edge.planners.paper.colony import ColonyConfig
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import StoppingCriterion, WorkLimit, ignore, never
+from fasaco_edge.planners.problem import CoverageProblem, graph_of
+from fasaco_edge.planners.registry import planner_of
 from tests.benchmarks.buildings import building
-from tests.benchmarks.harness import ProcessorBudget, check_covered, planner_for
+from tests.benchmarks.harness import ProcessorBudget, check_covered, grid_name, planner_for
 from tests.benchmarks.online.buildings import Building, BuildingChoice
 from tests.benchmarks.online.mission import Conditions, OnlineMission
 from tests.benchmarks.online.robot import Pace
@@ -44,7 +51,12 @@ FIRST_SEED = 100
 REPAIR, SPOT, REST, LARGE = KINDS = (
     "repair", "attempt around a spot", "attempt at the rest", "very large lattice",
 )  # fmt: skip
+FIRST = "first walk"
 LIVING, NEW, FLAT, NONE = VARIANTS = "living", "new", "flat", "none"
+# Of first walks: price of a quarter-turn [steps], the colony, and processor time of searches that
+# begin with them, the colony's included [s].
+FIRST_TURN, FIRST_ANTS, FIRST_Q0 = 5.0, 64, 0.9
+FIRST_BUDGETS_S = (0.02, 0.05, 0.2, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +71,7 @@ class MomentsPlan:
         with_turns: whether turns cost.
         large: searches of very large buildings.
         large_s: processor time of each [s].
+        first: grids to compare first walks on, in place of missions.
     """
 
     choice: BuildingChoice
@@ -68,6 +81,7 @@ class MomentsPlan:
     with_turns: bool
     large: int
     large_s: float
+    first: Sequence[NamedGrid]
 
 
 class Moment(NamedTuple):
@@ -92,13 +106,13 @@ class Answer:
     """
 
     cost_s: float
-    saved_s: float
-    taken_s: float
-    by_ants_s: float
-    by_search_s: float
-    ants: int
-    proposals: int
-    processor_s: float
+    saved_s: float = 0.0
+    taken_s: float = 0.0
+    by_ants_s: float = 0.0
+    by_search_s: float = 0.0
+    ants: int = 0
+    proposals: int = 0
+    processor_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +128,9 @@ class Replay:
 def measure(plan: MomentsPlan, say: Say) -> Generator[Replay, None, None]:
     """Yield each moment with its answers, once for each seed."""
     warm_up()
+    for grid, seed in itertools.product(plan.first, range(FIRST_SEED, FIRST_SEED + plan.seeds)):
+        say(f"{grid_name(grid.name)}: first walks")
+        yield from _first_walks(grid, seed)
     for moment in _moments(plan, say):
         budget_s = plan.large_s if moment.kind == LARGE else most_s(moment.problem)
         variants = variants_of(moment.kind)
@@ -124,7 +141,29 @@ def measure(plan: MomentsPlan, say: Say) -> Generator[Replay, None, None]:
 
 def variants_of(kind: str) -> Sequence[str]:
     """Return the variants of a kind: a known building has no living trail."""
+    if kind.startswith(FIRST):
+        return NEW, NONE
     return VARIANTS[1:] if kind == LARGE else VARIANTS
+
+
+def _first_walks(grid: NamedGrid, seed: int) -> Iterator[Replay]:
+    """Yield a first walk by ants, and searches from it, with those of simple walks."""
+    place, price = grid_name(grid.name), CoverageCost(1.0, FIRST_TURN)
+    problem = CoverageProblem.of(grid.lattice, grid.start, cost=price)
+    began = time.process_time()  # the colony walks in a thread of its own
+    colony = planner_of("fasaco", ColonyConfig(ants=FIRST_ANTS, q0=FIRST_Q0, seed=seed))
+    by_ants = colony.plan(problem, never, ignore)
+    took_s = time.process_time() - began
+    simple_s = min(map(problem.cost_us, first_walks(problem, graph_of(problem)))) / MICROSECONDS
+    begun = replace(problem, before=by_ants.cells, is_full=True)
+    answers = {NEW: _of(problem, by_ants, took_s), NONE: Answer(cost_s=simple_s)}
+    yield Replay(place, FIRST, seed, answers)
+    for budget_s in FIRST_BUDGETS_S:
+        answers = {}
+        for one, posed, left_s in ((NEW, begun, budget_s - took_s), (NONE, problem, budget_s)):
+            path = planner_for(seed).plan(posed, ProcessorBudget(left_s))
+            answers[one] = _of(problem, path, budget_s)
+        yield Replay(place, f"{FIRST}, after {budget_s:g} s", seed, answers)
 
 
 def _moments(plan: MomentsPlan, say: Say) -> Iterator[Moment]:
@@ -185,20 +224,26 @@ def _answer(moment: Moment, variant: str, seed: int, budget_s: float) -> Answer:
     path = planner.plan(problem, stop)
     processor_s = time.thread_time() - began
     whole = posed.whole or posed
-    check_covered(whole, path.cells)
-    cost_us, saved_us, taken_us = whole.price_us(path.cells), 0, 0
-    if posed.only_better:
-        assert whole.before is not None
-        before_us = whole.price_us(whole.before)
-        cost_us = min(cost_us, before_us)
-        saved_us = before_us - cost_us
-        share = NEW_WALK_SHARE if posed.is_full else LEAST_SHARE
-        least_us = max(LEAST_STEPS * whole.cost.step_us, share * before_us)
-        taken_us = saved_us if saved_us >= least_us else 0
+    answer = _of(whole, path, processor_s)
+    if not posed.only_better:
+        return answer
+    assert whole.before is not None
+    before_s = whole.price_us(whole.before) / MICROSECONDS
+    saved_s = max(before_s - answer.cost_s, 0.0)
+    share = NEW_WALK_SHARE if posed.is_full else LEAST_SHARE
+    is_taken = saved_s >= max(LEAST_STEPS * whole.cost.step_s, share * before_s)
+    return replace(
+        answer,
+        cost_s=before_s - saved_s,
+        saved_s=saved_s,
+        taken_s=saved_s if is_taken else 0.0,
+    )
+
+
+def _of(problem: CoverageProblem, path: CoveragePath, processor_s: float) -> Answer:
+    check_covered(problem, path.cells)
     return Answer(
-        cost_s=cost_us / MICROSECONDS,
-        saved_s=saved_us / MICROSECONDS,
-        taken_s=taken_us / MICROSECONDS,
+        cost_s=problem.price_us(path.cells) / MICROSECONDS,
         by_ants_s=path.saved.ants,
         by_search_s=path.saved.local_search,
         ants=path.work.ants,
