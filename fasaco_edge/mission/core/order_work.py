@@ -63,6 +63,8 @@ class OrderWork:
         if why := orders.part.why_looking(cell, now):
             return self._stand_by(why, now)
         if self.line.left.open_missed():
+            if why := self.line.left.share.why:
+                route.requests.want(why)
             return None
         if orders.part.pass_over_unreachable():
             self.share(cell, now, at_once=True)
