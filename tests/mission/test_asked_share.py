@@ -63,7 +63,7 @@ def test_the_robot_returns_until_the_share_is_swept(usual, share):
     assert robot.now < 1.6 * usual[0].now
     assert len(returns_of(robot)) == 1
     assert float(returns_of(robot)[0][2]) < 100 * share
-    told = f"; {100 * share:.1f} % asked for: {100 * swept:.1f} % but for strips a pixel wide"
+    told = f"; {100 * share:.2f} % asked for: {100 * swept:.2f} % but for strips a pixel wide"
     assert told in robot.mission.reason
     assert floor_report(robot.mission).reached_m2 > floor_report(usual[0].mission).reached_m2
 
@@ -77,7 +77,7 @@ def test_a_share_that_cannot_be_swept_ends_the_order_all_the_same():
     robot, swept = swept_flat(1.0)
     assert 0.99 < swept < 1.0
     assert len(returns_of(robot)) <= 3
-    assert "; 100.0 % asked for: 99." in robot.mission.reason
+    assert "; 100.00 % asked for: 99." in robot.mission.reason
     assert robot.mission.reason.startswith("every reachable cell is covered")
 
 

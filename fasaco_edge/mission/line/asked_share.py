@@ -97,8 +97,8 @@ class AskedShare:
         """Return how much of the share is swept, as the end of a sentence; "" if none is asked."""
         if self.share is None or not tally.wanted_m2:
             return ""
-        swept = percent(1.0 - tally.open_m2 / tally.wanted_m2)
-        return f"; {percent(self.share)} asked for: {swept} but for strips a pixel wide"
+        swept = percent(1.0 - tally.open_m2 / tally.wanted_m2, 2)
+        return f"; {percent(self.share, 2)} asked for: {swept} but for strips a pixel wide"
 
 
 def nearest_stands(

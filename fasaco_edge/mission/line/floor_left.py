@@ -242,7 +242,8 @@ class UnsweptTally:
         found, pixels = np.unique(at, axis=0, return_counts=True)
         may_open = [self._ledger.may_open_again((row, col)) for row, col in found.tolist()]
         again = self.share.returns_to(self._tally, found[may_open], pixels[may_open])
-        self._ledger.open_again(again)
+        if again:
+            self._ledger.open_again(again)
         return bool(again)
 
     def _begin_part(self) -> None:
