@@ -102,6 +102,7 @@ def _planner(config: DaemonConfig) -> Iterator[str]:
             yield f"no effect where planner.name is {planner.name}: {keys}"
     if planner.line == "cells":
         idle = ["planner.align"] if planner.align != usual.align else []
+        idle += ["planner.swept"] if planner.swept is not None else []
         idle += ["robot.overlap"] if config.robot.overlap != RobotConfig().overlap else []
         idle += ["robot.clearance_m"] if config.robot.clearance_m else []
         idle += ["robot.turn_radius_m"] if config.robot.turn_radius_m else []

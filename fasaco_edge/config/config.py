@@ -75,6 +75,9 @@ class PlannerConfig(StrictDocument, frozen=True):
     prefer cells that would soon be cut off, which saves revisits
     (``tests/benchmarks/RESULTS.md``).
 
+    ``swept`` is the share of the reachable floor that a line has to sweep: the robot returns for
+    what is missing once it has covered all else; null for the floor that is worth its time.
+
     ``align`` is the direction of the rows of cells if a line is driven: along the building's walls,
     once the map shows them clearly; along the map frame's axes; or at an angle to these [deg].
     """
@@ -92,6 +95,7 @@ class PlannerConfig(StrictDocument, frozen=True):
     budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.1
     spare_share: Annotated[float, Meta(ge=0, le=1)] = 0.05
     line: Literal["cells", "quick", "thorough"] = "thorough"
+    swept: Annotated[float, Meta(gt=0, le=1)] | None = None
     align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
 
     def faults(self) -> Iterator[BadConfiguration]:

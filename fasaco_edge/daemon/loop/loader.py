@@ -115,7 +115,8 @@ def _sweeping(config: DaemonConfig) -> Sweeping | None:
     robot, line = config.robot, LINES.get(config.planner.line)
     if line is None:
         return None
-    line = replace(line, speed_m_s=robot.speed_m_s, turning=robot.turning())
+    speed_m_s, turning = robot.speed_m_s, robot.turning()
+    line = replace(line, speed_m_s=speed_m_s, turning=turning, swept=config.planner.swept)
     most_pixels = floor_pixels(config.map.max_pixels)
     return Sweeping(
         robot.tool_width_m,

@@ -64,6 +64,8 @@ class OrderWork:
         if why := orders.part.why_looking(cell, now):
             return self._stand_by(why, now)
         if self.line.left.open_missed():
+            if why := self.line.left.share.why:
+                route.requests.want(why)
             return None
         if area is not None and orders.cells.pass_over(area):
             # Cells of others come before a retry.
