@@ -1,7 +1,7 @@
 """The table of all errors that users meet: each with its code, and a hint on what to do.
 
 A status, an error reply and ``--json`` of the command line carry the code. The text says what is
-wrong and where. (``cli.ask`` repeats errors that a daemon has answered with.)
+wrong and where. (``cli.ask`` passes on the errors that a daemon replies with.)
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class FasacoError(Exception):
         self.advise(self.hint if hint is None else hint)
 
     def advise(self, hint: str) -> None:
-        """Set the hint; tracebacks show it, too: in a notebook no command line prints it."""
+        """Set the hint, which tracebacks show, too: a notebook has no command line to print it."""
         self.hint = hint
         self.__notes__ = [f"hint: {hint}"] if hint else []
 
@@ -139,14 +139,14 @@ class PlanFailed(FasacoError):
 
 
 class PlannerFailed(FasacoError):
-    """A planner of the user's own, or the file it is in, raised an exception."""
+    """A planner of the user's own, or its file, raised an exception."""
 
     code = "planner_failed"
     hint = "the lines are those of your own file, the last one first"
 
 
 class IllegalWalk(FasacoError):
-    """What a planner of the user's own returned is no walk that solves the problem."""
+    """The result of a planner of the user's own is not a walk, or does not solve the problem."""
 
     code = "illegal_walk"
     hint = "return cells (row, col): from the start, one step each, over all of problem.to_cover"
@@ -254,7 +254,7 @@ class OpenToEveryone(BadConfiguration):
 
 
 class DiskFailed(FasacoError):
-    """A disk is broken or full, or the computer is out of files or memory: perhaps only for now."""
+    """A disk is broken or full, or the computer is out of files or memory, perhaps temporarily."""
 
     code = "disk_failed"
     hint = "check the disk and free space on it; a service retries by itself"
@@ -336,13 +336,13 @@ class PlacesElsewhere(FasacoError):
 
     code = "places_elsewhere"
     hint = (
-        "they are not used here: go back to their map; or give those of this one, its frame as "
-        "mission.map_frame, and reload; or `mission reset`, after which they count on this map"
+        "they are not used on this map: go back to their map; or give places of this map, with its "
+        "frame as mission.map_frame, and reload; or `mission reset`, after which they count here"
     )
 
 
 class FleetError(FasacoError):
-    """There is no room for the data of another robot of the fleet; they are left out.
+    """The data of another robot of the fleet do not fit, and are ignored.
 
     Also raised on a message of another version, which a daemon takes for a robot that does not fit.
     """
@@ -368,7 +368,7 @@ class CommandError(FasacoError):
 
 
 class WouldForget(FasacoError):
-    """A command that would forget what is covered, and does not say that it may."""
+    """A command that would forget what is covered, without the option that allows this."""
 
     code = "would_forget"
     hint = (

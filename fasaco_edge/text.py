@@ -87,7 +87,7 @@ def duration(seconds: float) -> str:
 
 
 def nearest(name: str, names: Collection[str], least: float = 0.6) -> list[str]:
-    """Return the names that ``name`` probably stands for: it lacks their unit, or is misspelt."""
+    """Return the names that ``name`` probably stands for, without their unit or misspelt."""
     near = [each for each in names if each.startswith(f"{name}_")]
     return near or get_close_matches(name, names, 1, least)
 

@@ -21,7 +21,7 @@ from fasaco_edge.planners.own.loading import SHAPE, is_place
 
 Sample = TypeVar("Sample")
 
-# Shows what is being measured, in a few words.
+# Shows in a few words what is measured.
 Say = Callable[[str], None]
 
 

@@ -31,10 +31,10 @@ MEASURES = (
     ("ready_s", "exec to liveliness token [s]", 3),
     ("status_s", "exec to first status [s]", 3),
     ("idle_mb", "memory before the first map [MB]", 1),
-    ("idle_own_mb", "of it its own, without files mapped into memory [MB]", 1),
+    ("idle_own_mb", "own part of it, without files mapped into memory [MB]", 1),
     ("idle_percent", "share of a core before the first map [%]", 2),
     ("warm_mb", "memory after map and plan [MB]", 1),
-    ("warm_own_mb", "of it its own, without files mapped into memory [MB]", 1),
+    ("warm_own_mb", "own part of it, without files mapped into memory [MB]", 1),
     ("peak_mb", "peak memory [MB]", 1),
 )
 # Goals: measured value, label, limit of its median, unit.
@@ -110,7 +110,7 @@ def _run(args: argparse.Namespace) -> DaemonRun:
 
 
 def _delay_ms(source: MapSource, grid: OccupancyGrid, crate: int) -> tuple[float, float]:
-    """Return the delay from a map with a crate to its path, and the part of planning [ms]."""
+    """Return the delay from a map with a crate to its path, and the time of planning [ms]."""
     stamp_ns = time.time_ns()
     put_at = source.put_map(with_crate(grid, crate, stamp_ns))
     at, plan_ms = source.wait_path(stamp_ns)

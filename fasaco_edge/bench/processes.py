@@ -37,7 +37,7 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import encode_occupancy_grid
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
 
-# Timeouts, long enough for a busy computer [s].
+# Timeouts, long enough for a busy computer, and interval of checks [s].
 START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 8.0
 LOOK_EVERY_S = 0.002
@@ -65,8 +65,8 @@ class DaemonProcess:
     """``fasaco-edge run`` on a free port of loopback: started on entry, ended on exit.
 
     Attributes:
-        keys: its keys.
-        endpoint: the endpoint that it listens at.
+        keys: keys of the daemon.
+        endpoint: the endpoint that the daemon listens at.
     """
 
     def __init__(self, config: dict[str, Any] | None = None) -> None:
@@ -89,7 +89,7 @@ class DaemonProcess:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
+        """Process id of the daemon."""
         return self._process.pid
 
     def join(self) -> Bus:
@@ -106,19 +106,19 @@ class DaemonProcess:
         return self._ends.enter_context(open_bus(BusSettings("client", (self.endpoint,))))
 
     def wait_alive(self, bus: Bus) -> float:
-        """Wait for its liveliness token; return the time since its start [s]."""
+        """Wait for the daemon's liveliness token; return the time since its start [s]."""
         while not bus.alive(self.keys.of(topics.ALIVE)):
             self._wait("say that it is alive")
         return time.monotonic() - self._started
 
     def wait_status(self, bus: Bus) -> float:
-        """Wait until it replies with a status; return the time since its start [s]."""
+        """Wait until the daemon replies with a status; return the time since its start [s]."""
         while not any(not reply.is_error for reply in bus.get(self.keys.rpc("status"))):
             self._wait("answer with a status")
         return time.monotonic() - self._started
 
     def check(self) -> None:
-        """Raise ProcessEnded if it has ended."""
+        """Raise ProcessEnded if the daemon has ended."""
         if (code := self._process.poll()) is not None:
             raise ProcessEnded(f"the daemon ended with {code}:{_last_lines(self._log)}")
 

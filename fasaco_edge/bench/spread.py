@@ -48,7 +48,7 @@ def text(spread: Spread | None, digits: int) -> tuple[str, str]:
 
 
 def percentile(values: Sequence[float], percent: float) -> float | None:
-    """Return the percentile of values by nearest rank, which is one of them; None without values.
+    """Return the percentile by nearest rank, so one of the values; None without values.
 
     Of 200 values, the 99th percentile is the third largest.
     """

@@ -4,9 +4,9 @@ They are part of the configuration of the listening session, or of a router: Zen
 messages before they reach this program. A role is named after what the *other* side does, as listed
 in ``protocol/security.md``.
 
-* Everything that is not named is denied. ``**`` does not match a chunk that begins with ``@``, so
-  every key is named, and also the key that Zenoh's advanced publishers and subscribers use to serve
-  late joiners: ``<key>/@adv/**``.
+* Everything that is not named is denied. Each key is named, as ``**`` does not match a chunk that
+  begins with ``@``; so is ``<key>/@adv/**``, by which Zenoh's advanced publishers serve late
+  joiners.
 * A role that speaks on a key may publish, reply to queries and declare a liveliness token there; a
   role that listens may subscribe, query and look for tokens. Neither may delete.
 * Rules hold in both directions: a message that a role may not receive is not sent to it.
@@ -49,8 +49,8 @@ class Role:
         description: the rights in words, for people.
         speaks: topics that it may publish, and on which it may reply to queries.
         listens: topics that it may subscribe to and query.
-        asked: topics whose subscribers, on this robot's key and on the key of all robots, are
-            announced to it: without subscribers it would not publish.
+        asked: topics whose subscribers are announced to it, on this robot's key and on the key of
+            all robots: it publishes only to subscribers.
         includes: another role whose rights it also has, or "".
     """
 
@@ -233,7 +233,7 @@ def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, An
 def user_password(user: str, password: str, dictionary_file: str) -> dict[str, Any]:
     """Return Zenoh's ``transport`` with authentication by user and password.
 
-    ``dictionary_file``: lines ``user:password`` of the users that may connect to it, or "".
+    ``dictionary_file``: lines ``user:password`` of the users that may connect here, or "".
     """
     login: dict[str, str] = {"user": user, "password": password}
     if dictionary_file:

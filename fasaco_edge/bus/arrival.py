@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 class Sample:
     """A message from the bus.
 
-    Payload and attachment stay in Zenoh's buffers until they are read: a message that a newer one
-    replaces first is never copied.
+    Payload and attachment stay in Zenoh's buffers until they are read: a message that is replaced
+    unread is never copied.
 
     Attributes:
         key: its key.
@@ -63,7 +63,7 @@ class Sample:
         return self._attachment
 
     def as_type(self, schema: str) -> Sample:
-        """Return it as a message of another type."""
+        """Return the sample as a message of another type."""
         return Sample(self.key, self._payload, schema, self._attachment, self.sender)
 
     def __eq__(self, other: object) -> bool:

@@ -1,10 +1,10 @@
 """Claim on a role that only one process may have at a time: planning for a robot, driving its base.
 
 Each process shows a liveliness token that ends with ``<its Zenoh id>/<its state>``: waits, yields,
-or a word for the active process. A process that finds another one active waits until that one is
-gone. Of the processes that wait, the one with the smallest id becomes active next; of two that are
-active after a network partition, the one with the smaller id continues. So all agree, whatever
-their clocks show. Below, the active process is the daemon that "plans".
+or a word for the active process. A process that finds another process active waits until that
+process is gone. Of the waiting processes, the one with the smallest id becomes active next. If two
+are active after a network partition, the process with the smaller id continues. So all agree,
+whatever their clocks show. Below, the active process is the daemon that "plans".
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ ASK_PERIOD_S = 1.0
 REJOIN_S = 3.0
 # Zenoh's lease: a session silent for this long is gone for the others [s].
 LEASE_S = 10.0
-# Pause of this process after which it may be gone for the others [s]: its last message before the
-# pause may already be a quarter of a lease old.
+# If this process pauses for this long [s], the others may count it as gone: its last message before
+# the pause may already be a quarter of a lease old.
 PAUSE_S = 0.75 * LEASE_S
 # Longest wait for a daemon with a smaller id that does not plan [s]: its lease and a margin.
 PATIENCE_S = 15.0
@@ -52,18 +52,18 @@ class ClaimState(StrEnum):
         return self in (ClaimState.WAITS, ClaimState.YIELDS)
 
 
-_SHOWN = (ClaimState.WAITS, ClaimState.YIELDS, ClaimState.PLANS)
+_TOKEN_STATES = (ClaimState.WAITS, ClaimState.YIELDS, ClaimState.PLANS)
 
 
 class Claim:
-    """Decision which daemon of a name plans, from observations and times alone.
+    """Decides which daemon of a name plans, from observations and times alone.
 
     Attributes:
         rejoin_s: time for which an active daemon that lost its connection stays uncertain after it
             has reconnected [s].
         state: state of this daemon.
-        rival: id of the daemon that it waits for, or last waited for; "" without one.
-        rival_yielded: whether this daemon plans, and another active one has just yielded.
+        rival: id of the daemon that this one waits for, or last waited for; "" for none.
+        rival_yielded: whether this daemon plans, and another planning daemon has just yielded.
     """
 
     rejoin_s = SETTLE_S
@@ -179,7 +179,7 @@ class BusClaim(Claim):
             self._version = self._token_list.version
             self._others = claims_in(self._token_list.there(), self._active)
             self._others.pop(self._bus.id, None)
-            # While none plans, the tokens are queried every cycle.
+            # While no daemon plans, the tokens are queried every cycle.
             self.is_settled = ClaimState.PLANS in (self.state, *self._others.values())
         self.decide(self._others, now, in_touch=in_touch)
         return self.state is not before
@@ -196,8 +196,8 @@ def claims_in(keys: Iterable[str], active: str = "plans") -> dict[str, ClaimStat
     for key in keys:
         _, own, state = key.rsplit("/", 2)
         state = ClaimState.PLANS if state == active else state
-        if ID.fullmatch(own) and state in _SHOWN:
+        if ID.fullmatch(own) and state in _TOKEN_STATES:
             # A daemon that changes its state has two tokens for a moment: PLANS takes precedence.
             before = claims.get(own, ClaimState.WAITS)
-            claims[own] = max(ClaimState(state), before, key=_SHOWN.index)
+            claims[own] = max(ClaimState(state), before, key=_TOKEN_STATES.index)
     return claims

@@ -99,7 +99,7 @@ class LatchedSubscription(Subscription):
             if asks_all:
                 questions.append((f"{self._caches}?_max={self._depth}", None))
             for publisher in self._publishers.take_due(now):
-                # Zenoh remembers each key: a single publisher is queried by the key of all.
+                # A single publisher is queried by the key of all, as Zenoh remembers each key.
                 key = self._caches if len(self._publishers) == 1 else publisher.key
                 questions.append((f"{key}?{self._order.missing(publisher.name)}", publisher))
             next_at = min(self._query_tokens_at, self._publishers.next_at)

@@ -1,7 +1,7 @@
 """Mailbox and slot between Zenoh's threads and a loop: a post takes O(1) and never blocks.
 
-A newer item replaces the older one of its kind. Kinds of which every item counts are queued in
-order: a map update changes the map before it, each pose adds to the swept floor.
+A newer item replaces the older item of its kind. If every item of a kind counts, the kind has a
+queue: a map update changes the map before it, each pose adds to the swept floor.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class Mailbox(Generic[Item]):
             self._on_lost(lost)
 
     def _post(self, kind: str, item: Item) -> list[Item]:
-        """Add an item; return those that its queue drops."""
+        """Add an item; return the items that its queue drops."""
         dropped: list[Item] = []
         with self._changed:
             if kind not in self._queued:

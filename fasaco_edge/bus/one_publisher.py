@@ -25,18 +25,18 @@ class Sessions(Protocol):
     """The bus's view of other sessions, by their Zenoh ids."""
 
     def is_linked(self, session: str) -> bool:
-        """Return whether it is connected to this session directly."""
+        """Return whether ``session`` is connected to this session directly."""
         ...
 
     def is_relay(self, session: str) -> bool:
-        """Return whether it is this session or its router: both mark samples without an id."""
+        """Return whether ``session`` is this one or its router: both mark samples without id."""
         ...
 
 
 class OnePublisher:
     """The publisher of one input that counts; used from one thread, or under the caller's lock.
 
-    ``name`` is that of the input, in the plural: "maps". After ``silent_s`` [s] of silence another
+    ``name``: the input in the plural, such as "maps". After ``silent_s`` [s] of silence another
     publisher takes over.
     """
 
@@ -96,10 +96,10 @@ class OnePublisher:
         return is_gone or now - self._received_at > self._silent_s
 
 
-# Number of maps within PERIOD_S [s], each equal to the last but one, that shows two publishers. A
+# This many maps within PERIOD_S [s], each equal to the last but one, show two publishers. A
 # door that opens and shuts is slower.
 RETURNS, PERIOD_S = 3, 10.0
-# Least difference of the two maps, above flickering pixels: free pixels along this length [m].
+# Least difference of the two maps: free pixels along this length [m]. Fewer are flicker.
 LEAST_WALL_M = 0.5
 
 # Frame, geometry and checksum of the pixels; and the number of free pixels.

@@ -27,7 +27,7 @@ class Publisher:
     In Zenoh the sender decides whether a sample is dropped on congestion.
 
     Attributes:
-        gid: of a ROS 2 topic's publisher, for rmw_zenoh's attachment of each sample; b"" for none.
+        gid: identifies a ROS 2 publisher in rmw_zenoh's attachment of each sample; b"" for none.
     """
 
     def __init__(self, session: zenoh.Session, key: str, schema: str, qos: Qos) -> None:

@@ -110,7 +110,7 @@ class QueryReply:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """A message that is published and kept for queries, without a copy for each.
+    """A message that is published and kept for queries, without a copy for each use.
 
     A path of half a million poses takes 40 MB; each put of bytes would copy it.
     """

@@ -138,16 +138,15 @@ class SampleOrder:
         self._last_mark = OrderedDict[str, int]()
         # When that sample was published, by the publisher's clock; 0 if unknown.
         self._stamps = OrderedDict[str, int]()
-        # The marks of publishers without a token. Only replies are dropped by them. Published
-        # samples are not, as a publisher may have restarted with an earlier clock: only a token
-        # shows it.
+        # The marks of publishers without a token. They are used to drop replies, not published
+        # samples: a publisher may have restarted with an earlier clock, which only a token shows.
         self._unconfirmed = OrderedDict[str, int]()
         # Samples that wait for replies.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
 
     def missing(self, name: str) -> str:
-        """Return the query for the samples after a publisher's last one."""
+        """Return the query for the samples after the last received sample of a publisher."""
         last = self._last_mark.get(name)
         if last is None or name.endswith("/uhlc"):
             return f"_max={self._depth}"
@@ -246,5 +245,5 @@ def _is_newer(mark: int, last: int | None) -> bool:
 
 
 def _leaves_gap(name: str, mark: int, last: int | None) -> bool:
-    """Return whether samples between the last one and this one are missing."""
+    """Return whether samples between the last sample and this one are missing."""
     return last is not None and not name.endswith("/uhlc") and _is_newer(mark, last + 1)

@@ -181,7 +181,7 @@ class Bus:
         self._served.append(_Served(key, receive, complete, declared))
 
     def let_others_answer(self, yes: bool) -> None:
-        """Set whether other queryables come first; if so, this one gets only queries to all."""
+        """Set whether other queryables come first: then this one gets only queries sent to all."""
         for served in self._served:
             if served.complete:
                 served.declared.undeclare()

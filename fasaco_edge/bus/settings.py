@@ -4,8 +4,8 @@ The same for every process:
 
 * no multicast scouting and no shared memory: a session reaches only configured endpoints, and an
   idle session stays small;
-* each topic has its QoS, see ``wire.topics``: samples that a planner publishes are dropped on
-  congestion, so that a frozen subscriber never blocks the planner.
+* each topic has its QoS, see ``wire.topics``: samples that a daemon publishes are dropped on
+  congestion, so that a frozen subscriber never blocks the daemon.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 if TYPE_CHECKING:
     import zenoh
 
-# Timeout of the handshake of an incoming connection [ms], and largest number of pending ones.
+# Timeout of the handshake of an incoming connection [ms]; largest number of pending handshakes.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
-# Length of the queues [packets of 64 kB]. A map or a path has many packets, and Zenoh's default of
-# two loses it if the computer is busy for 50 ms. These queues take a megabyte, only while needed.
+# Length of the queues [packets of 64 kB]. A map or a path has many packets, and with Zenoh's
+# default of two it is lost if the computer is busy for 50 ms. These queues take a megabyte, only
+# while needed.
 QUEUED_BATCHES = dict.fromkeys(
     ("interactive_high", "data_high", "data", "data_low", "background"), 16
 )
@@ -117,6 +118,6 @@ def _merged(own: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
 def first_line(error: Exception) -> str:
     """Return Zenoh's error message without the location in its sources, in plain words."""
     said = str(error).partition(" at /")[0].strip()
-    if (nobody := re.fullmatch(r"Unable to connect to any of \[(.*)\]!", said)) is None:
+    if (match := re.fullmatch(r"Unable to connect to any of \[(.*)\]!", said)) is None:
         return said
-    return "cannot connect to " + re.sub(r"Single\((.*?)\)", r"\1", nobody[1])
+    return "cannot connect to " + re.sub(r"Single\((.*?)\)", r"\1", match[1])

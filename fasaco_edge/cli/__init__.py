@@ -47,7 +47,7 @@ COMMANDS = {
 """Each command, and its line in ``fasaco-edge --help``."""
 
 # Errors of a faulty or full disk, or of exhausted memory or file descriptors. Their exit code makes
-# systemd restart a service; that of an invalid configuration does not.
+# systemd restart a service; the exit code of an invalid configuration does not.
 _TRANSIENT = frozenset(
     (errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
 )
@@ -143,7 +143,7 @@ def _describe(parser: argparse.ArgumentParser, command: Subcommand) -> None:
 
 
 def _is_transient(error: BaseException | None) -> bool:
-    """Return whether an error may end by itself, and is no mistake of the user."""
+    """Return whether an error may end by itself, and is not a mistake of the user."""
     # Errors of a user's own planner are the user's.
     while error is not None and not isinstance(error, PlannerFailed):
         if isinstance(error, OSError) and error.errno in _TRANSIENT:

@@ -33,7 +33,8 @@ examples:
   fasaco-edge bench planners --planner mine.py:walk    your planner beside the others
 
 Each benchmark has --help, and prints a table, or JSON with --json. Ctrl-C interrupts it: it then
-reports the measurements so far. Figures are medians with their range; run them on an idle machine.
+reports the measurements so far. Figures are medians with their range. Run benchmarks on an idle
+machine.
 """
 
 
@@ -139,7 +140,7 @@ def _print_table(console: Console, shown: ResultTable) -> None:
         table.add_column(column, justify="right", overflow="fold")
     for row in shown.rows:
         table.add_row(*map(Text, row))
-    # With less, words would be broken.
+    # At a smaller width, words would be broken.
     options = console.options.update(max_width=MOST_COLUMNS)
     least = Measurement.get(console, options, table).minimum
     if console.is_terminal and least > console.width:

@@ -91,7 +91,7 @@ def _document(
 
 
 def _print(file: Path, faults: list[BadConfiguration]) -> None:
-    """Print each fault as ``file:line: text``, and its hint unless that is the general one."""
+    """Print each fault as ``file:line: text``, and its hint, except the general hint."""
     console = out()
     for fault in faults:
         where = f"{file}:{fault.line}" if fault.line else str(file)

@@ -28,7 +28,7 @@ __all__ = [
     "swept_by_others",
 ]
 
-_PLACES = {
+_MODULES = {
     "apart": "mission.travel",
     "command_fleet": "cli.mission",
     "draw_fleet_mission": "review.drawing",
@@ -42,7 +42,7 @@ _PLACES = {
 
 def __getattr__(name: str) -> object:
     """Load a function of the fleet."""
-    if name not in _PLACES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found: object = getattr(import_module(f"fasaco_edge.fleet.{_PLACES[name]}"), name)
+    found: object = getattr(import_module(f"fasaco_edge.fleet.{_MODULES[name]}"), name)
     return found

@@ -62,7 +62,7 @@ It stops the robot within 0.2 s, and keeps it standing, while
   no daemon plans for it, or the daemon that plans has sent no status for 2.5 s
   another follower drives this robot: this follower then sends nothing, and takes over once the
     other is gone
-  access rules hide from other followers that this one drives
+  access rules hide this follower from other followers
 and when this program ends. The robot drives on by itself once the reason is gone. After the third
 try it drives on once the pose has moved by 0.1 m, or the path leads elsewhere (by 45 degrees or
 more). A pose with the stamp of the previous pose does not count as new.
@@ -103,8 +103,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--speed",
         type=float,
         metavar="X",
-        help="simulated seconds per second, for a simulated robot (default: robot.time_scale of "
-        "--config, else 1)",
+        help="simulated seconds per second, for a simulated robot (default: 1; required if "
+        "robot.time_scale of --config is not 1)",
     )
     add_robot_on_bus(parser)
     parser.add_argument("--given", action="store_true", help=argparse.SUPPRESS)
@@ -188,11 +188,18 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
 
 
 def _pace(args: argparse.Namespace, robot: RobotConfig) -> float:
-    """Return the seconds of the robot per second, as ``simulate`` has them."""
-    pace = robot.time_scale if args.speed is None else args.speed
+    """Return the simulated seconds per second.
+
+    A time scale left over from a simulation would give a real robot a wrong clock.
+    """
+    scale, pace = robot.time_scale, 1.0 if args.speed is None else args.speed
+    if args.speed is None and scale != 1.0:
+        raise BadConfiguration(
+            f"robot.time_scale is {scale:g}: that of a simulated robot",
+            hint=f"add --speed {scale:g} if the robot is simulated; else remove robot.time_scale",
+        )
     if not 0.0 < pace <= MOST_PACE:
-        where = "robot.time_scale" if args.speed is None else "--speed"
-        raise BadConfiguration(f"{where} must be above 0 and at most {MOST_PACE:g}, got {pace:g}")
+        raise BadConfiguration(f"--speed must be above 0 and at most {MOST_PACE:g}, got {pace:g}")
     return pace
 
 

@@ -115,7 +115,7 @@ class _Polygon(_Drawn, frozen=True):
                 key="coordinates",
             )
         if rings and rings[0] and rings[0][0] != rings[0][-1]:
-            text = "the last corner must be the first again"
+            text = "the last corner must equal the first"
             yield OrderError(text, key="coordinates[0]")
 
     @property
@@ -126,7 +126,7 @@ class _Polygon(_Drawn, frozen=True):
 
 
 class _Properties(_Drawn, frozen=True):
-    """Properties of a feature: a zone's members, which ``OrderDocument`` checks, and marks."""
+    """Properties of a feature: a zone's, which ``OrderDocument`` checks, keep_out and skip."""
 
     name: Any = None
     passes: Any = None
@@ -172,11 +172,11 @@ class _Collection(_Drawn, frozen=True):
     until_min: Any = UNSET
 
 
-OF_ORDERS = _Collection.__struct_fields__[2:]
+ORDER_MEMBERS = _Collection.__struct_fields__[2:]
 
 
 def drawn_order(document: Members) -> tuple[OrderDocument, list[OrderError]]:
-    """Return the order in a collection of polygons, and all faults, at keys of the collection.
+    """Return the order in a collection of polygons, and all faults with keys in the collection.
 
     A polygon is a zone, whose members are its properties; with ``"keep_out": true`` it is a
     keep-out. A feature with the number of a room orders that room, whatever its outline. With
@@ -204,7 +204,7 @@ def drawn_order(document: Members) -> tuple[OrderDocument, list[OrderError]]:
             origins[f"zones[{len(zones)}]"] = key
             zones.append({"name": f"zone {index + 1}"} | own)
     given = structs.asdict(drawn).items()
-    order = {name: value for name, value in given if name in OF_ORDERS and value is not UNSET}
+    order = {name: value for name, value in given if name in ORDER_MEMBERS and value is not UNSET}
     read, found = inspected(
         OrderDocument, order | {"zones": zones, "keep_out": keep_out}, OrderError
     )

@@ -53,7 +53,7 @@ def _add_actions(parser: argparse.ArgumentParser) -> None:
         action.set_defaults(rooms_action=name)
         if name != "list":
             action.add_argument("room", type=_room, metavar="ROOM", help="its number or name")
-        _ADD[name](action)
+        _ADD_OPTIONS[name](action)
         add_common(action)
         add_question(action)
 
@@ -100,7 +100,7 @@ def _add_list(action: argparse.ArgumentParser) -> None:
     )
 
 
-_ADD = {
+_ADD_OPTIONS = {
     "list": _add_list,
     "name": _add_name,
     "split": _add_split,

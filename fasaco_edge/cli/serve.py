@@ -39,7 +39,7 @@ is allowed. It is a client of the bus, as `watch` is, with the credentials of --
 --security; commands need an operator's credentials.
 
 With FILE.rrd the same page shows the recording, without commands: map, path, driven track and swept
-floor at each time, and state and figures by the status before, of which one in 15 s is recorded.
+floor at each time, and state and figures by the last status; one status in 15 s is recorded.
 
 FILE of --tokens has lines `viewer: TOKEN` and `operator: TOKEN`; if it does not exist, it is
 written with new tokens. A page asks for a token, or has it behind the # of its address. Without
@@ -188,7 +188,7 @@ def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> 
             for role, token in dict(reversed(guard.tokens)).items():
                 print(f"  {role}: {page}#{token}")
     else:
-        # No sign ends the link: terminals would take it for a part of it.
+        # No punctuation follows the link: terminals would include it.
         print(f"page at {page} {'with commands' if guard.role == 'operator' else 'to look only'}")
     sys.stdout.flush()
 

@@ -29,7 +29,7 @@ class BusJoining(ABC):
     """Joins the bus in a thread, and listens on it; a context manager.
 
     Attributes:
-        trouble: why the bus cannot be joined yet; "" once it is.
+        trouble: why the bus is not joined yet; "" once it is joined.
     """
 
     def __init__(self, settings: BusSettings) -> None:

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fasaco_edge.states import TROUBLED
 from fasaco_edge.text import one_line, percent
 from fasaco_edge.wire.documents.replies import (
     TROUBLES,
@@ -129,7 +130,6 @@ def age(seconds: float) -> str:
 KEPT = 200
 # Tone of an entry.
 PLAIN, GOOD, BAD, ORDER = "plain", "good", "bad", "order"
-TROUBLED = ("blocked", "degraded")
 
 
 @dataclass(frozen=True, slots=True)

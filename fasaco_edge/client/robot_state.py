@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # The daemon is silent after this time without a status [s]; it publishes one a second.
 SILENCE_S = 3.5
-# A map is complete once it has not grown for this time [s], and not for this share of the time in
+# A map is complete once it has not grown for COMPLETE_S [s], and for COMPLETE_SHARE of the time in
 # which it grew. The share is for large maps: a robot that sweeps explored floor finds nothing new
 # for minutes.
 COMPLETE_S, COMPLETE_SHARE = 180.0, 0.5

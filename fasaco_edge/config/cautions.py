@@ -36,7 +36,6 @@ def cautions(config: DaemonConfig) -> list[str]:
 
 
 def log_cautions(config: DaemonConfig) -> None:
-    """Log the cautions."""
     for text in cautions(config):
         LOG.warning("%s", text, extra={"event": "caution"})
 
@@ -63,7 +62,7 @@ def _tool(robot: RobotConfig) -> Iterator[str]:
         yield (
             f"robot.speed_m_s {robot.speed_m_s:g} beside robot.tool_width_m "
             f"{robot.tool_width_m:g}: floor counts as swept only if a pose comes at least "
-            f"{needed_hz:.0f} times a second; between poses farther apart it does not"
+            f"{needed_hz:.0f} times a second; floor between poses farther apart does not count"
         )
 
 
@@ -103,6 +102,7 @@ def _planner(config: DaemonConfig) -> Iterator[str]:
             yield f"no effect where planner.name is {planner.name}: {keys}"
     if planner.line == "cells":
         idle = ["planner.align"] if planner.align != usual.align else []
+        idle += ["planner.swept"] if planner.swept is not None else []
         idle += ["robot.overlap"] if config.robot.overlap != RobotConfig().overlap else []
         idle += ["robot.clearance_m"] if config.robot.clearance_m else []
         idle += ["robot.turn_radius_m"] if config.robot.turn_radius_m else []

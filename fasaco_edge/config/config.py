@@ -52,7 +52,7 @@ class MapConfig(StrictDocument, frozen=True):
 
 
 class PoseConfig(StrictDocument, frozen=True):
-    """The type of poses in samples that name none, as under ROS 2."""
+    """The type of poses in samples that name no type, as under ROS 2."""
 
     schema: Literal[
         "geometry_msgs/msg/PoseStamped",
@@ -75,6 +75,9 @@ class PlannerConfig(StrictDocument, frozen=True):
     prefer cells that would soon be cut off, which saves revisits
     (``tests/benchmarks/RESULTS.md``).
 
+    ``swept`` is the share of the reachable floor that a line has to sweep: the robot returns for
+    what is missing once it has covered all else; null for the floor that is worth its time.
+
     ``align`` is the direction of the rows of cells if a line is driven: along the building's walls,
     once the map shows them clearly; along the map frame's axes; or at an angle to these [deg].
     """
@@ -92,6 +95,7 @@ class PlannerConfig(StrictDocument, frozen=True):
     budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.1
     spare_share: Annotated[float, Meta(ge=0, le=1)] = 0.05
     line: Literal["cells", "quick", "thorough"] = "thorough"
+    swept: Annotated[float, Meta(gt=0, le=1)] | None = None
     align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
 
     def faults(self) -> Iterator[BadConfiguration]:
@@ -119,7 +123,8 @@ class PlannerConfig(StrictDocument, frozen=True):
 class MissionPolicyConfig(StrictDocument, MissionPolicy, frozen=True, kw_only=True):
     """The mission's policy, and the folder of its progress.
 
-    If ``state_dir`` is "", the folder is the state folder of the service or, without one, the user.
+    If ``state_dir`` is "", it is the state folder of the service or, without a service, of the
+    user.
     """
 
     state_dir: str = ""
@@ -257,8 +262,8 @@ class MetricsConfig(StrictDocument, frozen=True):
         """Return the address; None for none.
 
         Raises:
-            BadConfiguration: it is no address with a port, or other computers can reach it although
-                ``open_to_everyone`` is not set.
+            BadConfiguration: ``listen`` is not an address with a port, or other computers can reach
+                it and ``open_to_everyone`` is not set.
         """
         if not self.listen:
             return None
@@ -312,7 +317,7 @@ class DaemonConfig(StrictDocument, frozen=True):
 
     @property
     def lattice_deg(self) -> float | None:
-        """The angle of the cells' rows to the x axis of the map frame [deg]; None for the walls.
+        """The angle of the cells' rows to the x axis of the map frame [deg]; None: along the walls.
 
         Cells are aligned with the axes if walks lead through cell centres. In a fleet the axes
         take the place of the walls, as each robot would see other walls first.

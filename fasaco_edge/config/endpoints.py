@@ -79,7 +79,7 @@ def endpoint_faults(name: str, endpoints: Sequence[str]) -> Iterator[BadConfigur
 
 
 def _why_none(endpoint: str) -> str:
-    """Return why a text is no endpoint; "" if it is one."""
+    """Return why a text is not an endpoint; "" if it is an endpoint."""
     protocol, address = protocol_of(endpoint), re.split(r"[?#]", endpoint.partition("/")[2])[0]
     known = (*IP, *UNIX, *DEVICES)
     if protocol not in known:

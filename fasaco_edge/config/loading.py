@@ -17,11 +17,11 @@ from fasaco_edge.mission.orders.mask import INLINE, inline_mask
 
 
 def load_config(path: Path | None) -> DaemonConfig:
-    """Read a YAML file; without one return the defaults.
+    """Return the configuration in a YAML file; the defaults without a file.
 
     Raises:
-        BadConfiguration: the file is missing, is no YAML, has unknown keys or impossible values. It
-            is the first fault, and holds the others as ``rest``.
+        BadConfiguration: the file is missing, is not YAML, has unknown keys or impossible values.
+            The error is the first fault, and holds the others as ``rest``.
     """
     config, faults = inspect_config(path)
     if config is None:
@@ -36,7 +36,7 @@ def with_mask(config: DaemonConfig, file: Path | None, most_bytes: int | None) -
     ``most_bytes``: limit on the memory for reading the mask [bytes]; None for no limit.
 
     Raises:
-        BadConfiguration: the mask cannot be read, or takes more memory.
+        BadConfiguration: the mask cannot be read, or takes more memory than that.
     """
     mission = config.mission
     if not mission.keep_out_mask or mission.keep_out_mask.startswith(INLINE):
@@ -50,7 +50,7 @@ def decode_config(document: bytes) -> DaemonConfig:
     """Return a configuration from the JSON that another process of the package has encoded.
 
     Raises:
-        BadConfiguration: it is no configuration.
+        BadConfiguration: the document is not a configuration.
     """
     try:
         return msgspec.json.decode(document, type=DaemonConfig)

@@ -72,7 +72,7 @@ class RobotConfig(StrictDocument, frozen=True):
     as the robot's limits allow: the rate of turning [deg/s], the angular acceleration [deg/s2], the
     acceleration of driving [m/s2], and the largest bend that is steered while driving [deg].
     ``overlap`` is the share of the tool's width by which cells overlap if a line is driven
-    (``planner.line``); the line then leaves out floor swept already. Passes of an order may set
+    (``planner.line``); the line leaves out floor that is swept already. Passes of an order may set
     another overlap. ``footprint`` replaces ``radius_m`` by the radius of the disc around it.
     ``clearance_m`` is the distance that lines keep from walls and furniture in addition to the
     radius. A line keeps half of it, or none, where it would otherwise miss much floor.
@@ -102,7 +102,7 @@ class RobotConfig(StrictDocument, frozen=True):
     time_scale: Annotated[float, Meta(ge=0.01, le=1000)] = 1.0
 
     def __post_init__(self) -> None:
-        """Set the radius to that of the disc around the footprint, if there is one."""
+        """Set the radius to the radius of the disc around the footprint, if there is one."""
         if self.footprint and self.radius_m == DEFAULT_RADIUS_M:
             radius_m = self.footprint.radius() or DEFAULT_RADIUS_M
             msgspec.structs.force_setattr(self, "radius_m", radius_m)
@@ -130,9 +130,9 @@ class RobotConfig(StrictDocument, frozen=True):
             return ""
         tool = (
             f"lines are planned as if its tool were {abs(self.tool_ahead_m):g} m further "
-            f"{'back' if self.tool_ahead_m > 0.0 else 'ahead'}, where it turns about"
+            f"{'back' if self.tool_ahead_m > 0.0 else 'ahead'}, at its turning point"
             if self.tool_ahead_m
-            else "its tool is where it turns about"
+            else "its tool is at its turning point"
         )
         turns = "have any heading" if self.turn_radius_m else "turn on the spot"
         return (

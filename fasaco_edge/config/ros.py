@@ -63,7 +63,7 @@ class RosFrames(StrictDocument, frozen=True):
 
     def faults(self) -> Iterator[BadConfiguration]:
         for key, frame in msgspec.structs.asdict(self).items():
-            # Unprintable characters may have no UTF-8, or be a NUL.
+            # Unprintable characters may not exist in UTF-8, or be a NUL.
             printed = frame if frame.isprintable() else ""
             if not 0 < len(printed.encode()) <= MAX_STRING_BYTES:
                 yield _misfit(key, "the name of a frame", frame)

@@ -138,7 +138,7 @@ class SecurityConfig(StrictDocument, frozen=True):
     ) -> dict[str, Any]:
         """Return the credentials of a daemon's session, with access control for all others.
 
-        ``prefix`` is that of all keys of the robot; ``ros`` and ``ros_driver`` are the rights of
+        ``prefix``: prefix of all keys of the robot; ``ros`` and ``ros_driver``: the rights of
         the roles ``ros`` and ``driver`` under ROS 2, None without a section ``ros2``.
 
         Raises:

@@ -30,7 +30,6 @@ def log_fault(log: logging.Logger, fault: FasacoError) -> str:
 
 
 def fault_text(fault: FasacoError) -> str:
-    """Return a fault with its hint."""
     return f"{fault}: {fault.hint}" if fault.hint else str(fault)
 
 
@@ -90,16 +89,15 @@ class CycleTimes:
 
 
 class MapLatency:
-    """Latency from the arrival of a map that needs a plan to that plan's path.
+    """Time from the arrival of a map that needs a plan until the path of that plan is sent.
 
     Attributes:
-        arrived: when the newest map of this cycle arrived [s, monotonic]; None without one.
+        arrived: arrival of the newest map of this cycle [s, monotonic]; None without a map.
     """
 
     def __init__(self) -> None:
         self.arrived: float | None = None
-        # Arrival of the oldest map without a plan request, and of the map of the plan under
-        # way.
+        # Arrivals: of the oldest map for which no plan is requested yet, of the map being planned.
         self._unanswered: float | None = None
         self._asked: float | None = None
 

@@ -39,7 +39,7 @@ class PeriodicMessage(Protocol):
     """A message that is published when it is due."""
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish it if due at ``now`` [s, monotonic]; the caller catches failures."""
+        """Publish the message if it is due at ``now`` [s, monotonic]; may raise any error."""
 
 
 def company_of(config: DaemonConfig) -> CompanyKind:

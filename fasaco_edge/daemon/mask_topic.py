@@ -108,7 +108,7 @@ class MaskTopic:
                     hint = "publish map and mask in the same frame"
                     faults.append(BadConfiguration(text, hint=hint, key="keep_out_mask"))
         self._in_force = self._masks.get(frame, self._in_force)
-        # Only a restart can replace the mask of a message by that of a file.
+        # Only a restart can replace the mask of a message by the mask of a file.
         mission = structs.replace(config.mission, keep_out_mask=self._in_force)
         return structs.replace(config, mission=mission), faults
 

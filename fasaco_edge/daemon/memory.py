@@ -28,12 +28,12 @@ by tile, and tiles are bounded (``grid.lattice``).
 A cell takes these bytes:
 
 * the path: some 80 for each pose, twice while it is sent;
-* the living trail: 16, another 16 while a plan or a writer has a copy, and 8 in the ledger's file;
-  (the trail of a plan's ants spans only the regions that they walked on);
+* the living trail: 16, another 16 while a plan or a writer has a copy (the trail of a plan's ants
+  spans only the regions that they walked on), and 8 in the ledger's file;
 * priorities: 1 if received as a message, and 2 for priorities of rooms;
 * covered cells of the ledger: 4, with the copy being written;
-* swept floor: 18 for a cell of 0.3 m, a bit for each pixel of 2.5 cm, and as much again if it has
-  changed since the copy being written.
+* swept floor: 18 for a cell of 0.3 m (a bit for each pixel of 2.5 cm), and as much again if the
+  floor has changed since the copy that is being written.
 
 The ledger has limits of its own: 34 MB for cells, and twice 13 MB for floor.
 
@@ -42,7 +42,7 @@ takes 121 MB, 17 MB of them for the map, and 228 MB with pages of libraries, whi
 reclaim (``fasaco-edge bench daemon``). A path of 440,000 cells takes 127 MB more; maps of 25
 million pixels at 20 Hz take 75 MB more, 240 MB if an update of full size follows each, and another
 50 MB with a recorder. The base includes 42 MB of samples other than maps that wait for the loop,
-and the library pages in use. A library that was just unpacked takes up to 16 MB more of them than a
+and the library pages in use. A library that was just unpacked takes up to 16 MB more pages than a
 copy of it, as the system maps it in larger blocks.
 """
 
@@ -133,7 +133,7 @@ def unit_bytes(config: DaemonConfig) -> tuple[int, int]:
 def floor_pixels(max_pixels: int) -> int:
     """Return the limit on the pixels of the raster of floor, for maps of ``max_pixels``.
 
-    It is a map with a frame around it, so that every accepted map fits.
+    The raster adds a frame around the map, so that every accepted map fits.
     """
     return max_pixels + max_pixels // 10 + FRAME_PIXELS
 
@@ -149,7 +149,7 @@ def mask_bytes(config: DaemonConfig, limit: int | None) -> int:
 
 
 def limits_mib(config: DaemonConfig) -> tuple[int, int]:
-    """Return the values for ``MemoryHigh=`` and ``MemoryMax=`` of its unit [MiB].
+    """Return the values for ``MemoryHigh=`` and ``MemoryMax=`` of the daemon's unit [MiB].
 
     Both are rounded up to multiples of 16.
     """
@@ -172,7 +172,7 @@ def limited_to_memory(config: DaemonConfig, limit: int | None) -> DaemonConfig:
     share = max(spare, 0) / (needed_bytes(config) - BASE_BYTES)
     cells = max(int(share * maps.max_lattice_cells), least_cells)
     pixels = max(min((spare - cell_bytes * cells) // pixel_bytes, maps.max_pixels), least_pixels)
-    # If the pixels cannot shrink alike, the cells shrink more.
+    # Pixels at their least number leave less memory for cells.
     cells = max(min((spare - pixel_bytes * pixels) // cell_bytes, cells), least_cells)
     smaller = structs.replace(maps, max_pixels=pixels, max_lattice_cells=cells)
     return structs.replace(config, map=smaller)

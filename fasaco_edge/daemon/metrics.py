@@ -27,8 +27,8 @@ LOG = logging.getLogger(__name__)
 PATH = "/metrics"
 # Limit on the bytes of a request; timeout of a connection [s].
 MOST_BYTES, LONGEST_S = 8192, 1.0
-# Delay of each answer, and time for which all get the same answer [s], so that a client in a tight
-# loop costs little. Limit on open connections, beyond which the oldest is closed.
+# Delay of each answer, and time for which all clients get the same answer [s], so that a client in
+# a tight loop costs little. Limit on open connections, beyond which the oldest is closed.
 PAUSE_S, MOST_OPEN = 0.05, 64
 REASONS = {200: "OK", 404: "Not Found", 405: "Method Not Allowed", 503: "Service Unavailable"}
 
@@ -122,7 +122,7 @@ METRICS = (
     ),
     Metric("battery_ratio", "charge of the battery", _member("battery", "level")),
     Metric("path_revision", "counts published paths", _member("path", "revision")),
-    Metric("path_remaining_steps", "still to drive", _member("path", "remaining_steps")),
+    Metric("path_remaining_steps", "steps still to drive", _member("path", "remaining_steps")),
     Metric("path_gap_ratio", "cost above the lower bound", _member("path", "gap")),
     Metric("plans_total", "plans made", _member("plan", "plans")),
     Metric(
@@ -149,7 +149,7 @@ METRICS = (
         lambda s: [({}, s.recorder.state == "recording")] if s.recorder else [],
     ),
     Metric("recorder_lost_total", "samples not written", _member("recorder", "lost")),
-    Metric("recorder_restarts_total", "its restarts", _member("recorder", "restarts")),
+    Metric("recorder_restarts_total", "restarts of the recorder", _member("recorder", "restarts")),
     Metric("memory_bytes", "of the process", _one(lambda s: s.rss_mb * MEGABYTE)),
     Metric("processor_seconds_total", "of the process", _one(lambda s: s.cpu_s)),
     Metric("threads", "of the process", _one(lambda s: s.threads)),

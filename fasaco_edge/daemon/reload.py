@@ -25,35 +25,32 @@ from fasaco_edge.host.processes import memory_limit
 
 LOG = logging.getLogger(__name__)
 
-# Sections and keys that can change in a running daemon, without those that opened session, ledger
-# or another process.
+# Sections and keys that can change in a running daemon.
 CHANGEABLE = frozenset(
     {
         "planner",
-        "map.free_at_most",
-        "map.occupied_at_least",
+        "map",
+        "mission",
         "robot.speed_m_s",
         "robot.quarter_turn_s",
         "robot.turn_deg_s",
         "robot.turn_deg_s2",
         "robot.acceleration_m_s2",
         "robot.steered_deg",
-        "mission.retries",
-        "mission.retry_s",
-        "mission.until_min",
-        "mission.lost_pose_s",
-        "mission.stale_map_s",
-        "mission.zones",
-        "mission.keep_out",
-        "mission.keep_out_mask",
-        "mission.home",
-        "mission.dock",
-        "mission.map_frame",
-        "mission.by_room",
     }
 )
-# Exceptions in a section that can change: they determine the ledger's cells.
-FIXED = frozenset({"planner.line"})
+# Exceptions in these sections: they determine the ledger's cells, the shares of memory, or what
+# opened session, ledger or another process.
+FIXED = frozenset(
+    {
+        "planner.line",
+        "map.max_pixels",
+        "map.max_lattice_cells",
+        "mission.autostart",
+        "mission.keep_out_topic",
+        "mission.state_dir",
+    }
+)
 
 
 def read_config(path: Path | None) -> DaemonConfig:

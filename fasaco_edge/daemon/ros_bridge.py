@@ -24,7 +24,7 @@ from fasaco_edge.wire.messages.ros_node import encode_diagnostics
 from fasaco_edge.wire.ros_keys import Endpoint, RosNode, RosTopic, gid_of
 from fasaco_edge.wire.topic_types import VOLATILE, Topic
 
-# Limit on a request [bytes]; that of a Trigger has five.
+# Limit on a request [bytes]; a request of Trigger has five.
 MOST_REQUEST_BYTES = 1024
 
 

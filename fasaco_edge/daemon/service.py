@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# Time for the recorder's footer after SIGTERM, so that the daemon exits within two seconds [s]; and
-# limit for a recorder that still works, on a slow computer, within ``TimeoutStopSec=`` of the unit
+# Time for the recorder's footer after SIGTERM, so that the daemon exits within two seconds [s];
+# limit for a recorder that still works, as on a slow computer, below the unit's ``TimeoutStopSec=``
 # [s].
 RECORDER_STOP_S, RECORDER_LONGEST_S = 1.2, 6.0
 WORKER_STOP_S = 0.4
@@ -85,7 +85,7 @@ def run_daemon(
     """
     started = time.monotonic()
     sys.setswitchinterval(SWITCH_S)
-    # Else every thread would keep the memory of its largest map: 430 MB resident, not 250.
+    # Otherwise every thread would keep the memory of its largest map: 430 MB resident, not 250.
     return_soon()
     stop = threading.Event()
 
@@ -123,7 +123,7 @@ def run_daemon(
 
 
 def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManager) -> Bus | None:
-    """Open a session, for which a client waits for its router; None if stopped meanwhile.
+    """Return an open session; a client waits for its router; None if stopped meanwhile.
 
     Raises:
         BusUnavailable: no session can be opened, even by waiting.
@@ -160,7 +160,7 @@ def _afforded(config: DaemonConfig) -> DaemonConfig:
         LOG.log(
             logging.INFO if has_default_sizes(config) else logging.WARNING,
             "memory is limited to %.0f MB, maps of map.max_pixels %d and map.max_lattice_cells %d "
-            "may need %.0f: no more than %d and %d are taken",
+            "may need %.0f MB: they are reduced to %d and %d",
             limit / 1e6,
             config.map.max_pixels,
             config.map.max_lattice_cells,

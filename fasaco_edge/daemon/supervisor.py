@@ -25,8 +25,7 @@ LOG = logging.getLogger(__name__)
 
 # Pause before a restart [s], doubled with each restart.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0
-# Time without a report after which a running recorder counts as hung, longer than a slow one takes
-# [s].
+# Time without a report after which a running recorder counts as hung, even on a slow computer [s].
 SILENT_AFTER_S = 30.0
 # Timeout of its first report, as slow computers load its libraries for half a minute [s].
 START_WITHIN_S = 120.0
@@ -63,7 +62,7 @@ class RecorderSupervisor:
         if self._start_at is None:
             if code is not None:
                 self._death = f"died by signal {-code}" if code < 0 else f"exited with {code}"
-            LOG.warning("recorder %s; again in %.0f s", self._death, self._pause_s)
+            LOG.warning("recorder %s; it restarts in %.0f s", self._death, self._pause_s)
             self._start_at = now + self._pause_s
             self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
         elif now >= self._start_at:
@@ -80,7 +79,9 @@ class RecorderSupervisor:
             with open(os.memfd_create("configuration"), "w+b") as document:
                 document.write(self._config)
                 document.seek(0)
-                self._process = subprocess.Popen(self._command, stdin=document)
+                # A process group of its own keeps Ctrl-C away: the recorder ends after the daemon's
+                # last messages.
+                self._process = subprocess.Popen(self._command, stdin=document, process_group=0)
         except OSError as error:
             self._process, self._death = None, f"could not be started: {error.strerror}"
 

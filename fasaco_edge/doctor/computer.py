@@ -195,7 +195,7 @@ def _space(name: str, folder: Path, least_mb: float) -> Finding:
     if system.f_flag & os.ST_RDONLY:
         return fail(f"{found}, read-only", f"mount {there} for writing")
     if system.f_files and not system.f_favail:
-        return fail(f"{found}, but no file more", "delete files there")
+        return fail(f"{found}, but no more files fit", "delete files there")
     if free_mb < least_mb:
         to_do = f"free {least_mb:.0f} MB in {there}"
         return Finding(Level.FAIL if free_mb < 1 else Level.WARN, found, to_do)
@@ -233,7 +233,7 @@ def _state_faults(context: CheckContext) -> list[Finding]:
     try:
         status = folder.stat()
     except FileNotFoundError:
-        return []  # the daemon makes it
+        return []  # the daemon creates it
     except OSError as error:
         # The folder of a service with its own user may be inside a folder that only root can read.
         return [ok(f"{folder}: {error.strerror}")] if context.unit else []

@@ -55,7 +55,7 @@ class _RunningCheck:
             self._found = warn(said, "please report this")
 
     def finding(self, deadline: float) -> Finding:
-        """Return its finding by ``deadline`` [s, monotonic]."""
+        """Return the check's finding by ``deadline`` [s, monotonic]."""
         self._thread.join(max(deadline - time.monotonic(), 0.0))
         return self._found or warn(
             f"no answer after {PATIENCE_S:g} s", "check whether a disk or a peer on the bus hangs"
@@ -68,7 +68,7 @@ def findings(
     """Yield the name and finding of each check.
 
     The configuration in the file ``path``, None for the defaults, is checked first; if it is
-    refused, only the computer is checked, too. ``recordings``: folder for recordings.
+    refused, only checks of the computer follow. ``recordings``: folder for recordings.
     """
     deadline = time.monotonic() + PATIENCE_S
     try:

@@ -82,7 +82,7 @@ def _reach(endpoint: str) -> str:
     return "from this computer" if is_local(endpoint) else "from other computers"
 
 
-SOON = timedelta(days=30)
+EXPIRES_SOON = timedelta(days=30)
 SECRETS = {
     "tls": ("private_key",),
     "user": ("password_file", "dictionary_file"),
@@ -95,7 +95,7 @@ def identity(context: CheckContext) -> Finding:
     bus = context.config.bus
     security, listens = bus.security, bool(bus.listen)
     if security.kind == "none":
-        return ok("no authentication, neither way")
+        return ok("no authentication in either direction")
     try:
         security.of_daemon(context.config.keys().prefix)
         if security.kind == "user":
@@ -111,7 +111,7 @@ def identity(context: CheckContext) -> Finding:
     found = f"certificate of {certificate.name!r}, ends {certificate.ends:%Y-%m-%d}"
     if not certificate.name or (listens and not certificate.hosts):
         return fail(f"{found}: a name is missing in it", HOW_TO, details)
-    if left < SOON:
+    if left < EXPIRES_SOON:
         return warn(f"{found}, in {left.days} days", "renew it", details)
     return ok(found, details)
 

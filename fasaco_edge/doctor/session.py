@@ -72,7 +72,7 @@ def why_not_bound(endpoint: str) -> str:
 LISTEN_S = 0.7
 ASK_S = 0.7
 # What to do about two publishers of one input.
-ONE_ONLY = "stop all but one: the daemon uses the first it receives, until that is silent"
+ONE_ONLY = "stop all but one: the daemon uses the first it receives, until it is silent"
 # Largest number of maps under other names that are listed.
 MOST_PLACES = 8
 # Positions of the entity's kind and of its topic's type in a token of rmw_zenoh
@@ -122,7 +122,7 @@ def session(context: CheckContext) -> Finding:
 
 
 def lacking_inputs(status: Status) -> list[str]:
-    """Return the inputs that a daemon waits for; none before it looks at inputs, while it loads."""
+    """Return the inputs that a daemon waits for; none while it loads."""
     if status.state == "loading":
         return []
     return [kind for kind in ("map", "pose") if getattr(status, kind) is None]
@@ -197,7 +197,7 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
 
 
 class MapsElsewhere:
-    """Maps that are published under other names than ``own``, those of this daemon's map."""
+    """Maps that are published under other names than this daemon's map; ``own``: its names."""
 
     def __init__(self, bus: Bus, own: list[str]) -> None:
         self._bus = bus

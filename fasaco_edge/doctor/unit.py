@@ -1,4 +1,4 @@
-"""Unit of the daemon's service, as systemd has it."""
+"""Unit of the daemon's service, as systemd has loaded it."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ UNREACHABLE: Colour = (200, 60, 60)
 START: Colour = (13, 128, 92)
 END: Colour = (190, 24, 60)
 
-# Okabe and Ito's colours, safe for colour-blind people, without yellow, which white hides.
+# Okabe and Ito's colours, safe for colour-blind people; without yellow, hard to see on white.
 BLUE: Colour = (0, 114, 178)
 VERMILION: Colour = (213, 94, 0)
 GREEN: Colour = (0, 158, 115)

@@ -100,7 +100,7 @@ def arrow_places(points: Points, every: float) -> NDArray[np.intp]:
     return np.unique(candidates[nearest[nearest < len(candidates)]])
 
 
-# In cells.
+# Offset of a lane from the cells' centres, width of its line, size of an arrow [cells].
 LANE_OFFSET = 0.11
 LINE_WIDTH = 0.13
 ARROW_SIZE = 0.34
@@ -222,7 +222,7 @@ def _draw_arrows(plot: Plot, points: Points, offset: float, cell_m: float) -> No
         plot.arrow(middles[place], along[place], size)
 
 
-# In cells.
+# Width of a driven track [cells].
 DRIVEN_WIDTH = 0.12
 # Width of the border of a room.
 ROOM_PX = 1.2

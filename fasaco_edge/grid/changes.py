@@ -92,8 +92,8 @@ class LatticeChange:
             lattice: the lattice over the previous map, made for ``footprint``.
             footprint: footprint of the lattice.
             max_cells: limit on the cells of the new lattice.
-            within: window of the pixels (row, col) that may differ if the map has not moved, as
-                a patch gives it; only these are compared. None for all.
+            within: window of the pixels (row, col) that may differ if the map has not moved, such
+                as a patch's window; only these pixels are compared. None for all.
 
         Raises:
             MapTooLarge: the new lattice would have more than ``max_cells`` cells, or the pixels

@@ -1,8 +1,8 @@
 """Fine raster of a map: its pixels, polygons on it, and the pixels that a change affects.
 
-The pixels of a map are divided, as a tool leaves strips along walls that are narrower than most
-maps' pixels. A border of unknown pixels surrounds the map. Pixel (i, j) of the raster is the unit
-square around the point (y = i, x = j).
+The pixels of a map are divided, because the strips that a tool leaves along walls are narrower than
+most maps' pixels. A border of unknown pixels surrounds the map. Pixel (i, j) of the raster is the
+unit square around the point (y = i, x = j).
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ FINE_M = 0.025
 DECIMALS = 6
 # Approximate number of pixels processed at once in arrays of a byte or more per pixel.
 STRIP = 1 << 20
-# Largest distance of a step's bend from the centres of its two cells [cells]; addition to it for
-# rounding [pixels].
+# Largest distance of a step's bend from the centres of its two cells [cells]; margin for rounding
+# [pixels].
 REACH_CELLS, REACH_PX = 2.5, 2.0
 
 
@@ -186,7 +186,7 @@ class PolygonsOnRaster:
         """Convert polygons (x, y) [m], one or more, to the raster of a geometry."""
         ends = np.cumsum([len(polygon) for polygon in polygons])
         points = np.array([corner for polygon in polygons for corner in polygon], np.float64)
-        # Otherwise rounding of the raster's corner could move an edge off or onto a pixel's edge.
+        # Rounded, as an error of the raster's corner could move an edge off or onto a pixel's edge.
         cols, rows = (
             np.round(each, DECIMALS) for each in geometry.to_pixels(points[:, 0], points[:, 1])
         )

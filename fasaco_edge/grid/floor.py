@@ -40,7 +40,7 @@ from fasaco_edge.kernels.floor.places import (
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
-# Limit on the fine pixels, for the memory of int8 and int32 arrays of them.
+# Limit on the fine pixels, so that int8 and int32 arrays of them fit into memory.
 MOST_PIXELS = 100_000_000
 
 
@@ -52,7 +52,7 @@ class Floor:
         geometry: geometry of the fine raster, with a border around the map.
         discs: robot and tool.
         blocked: uint64 (rows, words), see ``kernels.floor.bits``: pixels not known free.
-        places: likewise: pixels whose centre the robot can occupy and reach.
+        places: uint64 (rows, words): pixels whose centre the robot can occupy and reach.
         reachable: bool (rows, cols): pixels whose centre the tool reaches from these places.
         start: y, x of the place nearest to the start [pixels].
     """

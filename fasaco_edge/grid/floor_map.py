@@ -63,8 +63,8 @@ class FloorMap:
         discs: robot and tool.
         geometry: geometry of the fine raster.
         blocked: uint64 (rows, words), see ``kernels.floor.bits``: pixels that are not known free,
-            or are kept out of.
-        places: likewise: pixels whose centre the robot can occupy, reachable or not.
+            or lie in keep-out polygons.
+        places: uint64 (rows, words): pixels whose centre the robot can occupy, reachable or not.
         stands: the lattice of stands.
         revision: incremented with each map.
         shift: shift of pixels on the raster by the newest map, in rows and columns; None for
@@ -137,10 +137,10 @@ class FloorMap:
         near = cells_near_changes(grids, plain.window, wide, thresholds, within)
         self.revision += 1
         self.shift = geometry.corner_of(self.geometry)
-        # Without new cells: along the sides of a grown map they contain little new floor.
+        # ``near`` leaves out new cells: along the sides of a grown map they add little floor.
         self.touched = self._reach.pixels_of(near, plain.window, geometry)
         if plain.window != before.window:
-            # Floor that is no longer shown may lie beyond the new cells.
+            # Floor that the new map does not show may lie beyond its cells.
             lost = cells_near_changes(grids, before.window, wide, thresholds, within)
             lost_pixels = self._reach.pixels_of(lost, before.window, geometry)
             self.touched = Window.around(self.touched, lost_pixels)
@@ -278,7 +278,7 @@ class FloorMap:
         return stand_placement(self.geometry, self._footprint.cell_m, self.discs.radius_m)
 
     def _compute_stands(self, plain: CoverageLattice, stale: NDArray[np.bool_]) -> None:
-        """Recompute stale cells; the others are taken from the previous lattice."""
+        """Recompute stale cells; take the other cells from the previous lattice."""
         self.stands = StandLattice.where(
             self.blocked,
             self.places,

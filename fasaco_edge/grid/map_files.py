@@ -236,7 +236,7 @@ def find_map(name_or_path: str | Path) -> Path:
     if str(name_or_path) and os.path.isdir(path):
         inside = [path / name for name in _map_names(path) if name.endswith((".yaml", ".yml"))]
         listed = ", ".join(map(str, inside[:MOST_LISTED])) + ", ..." * (len(inside) > MOST_LISTED)
-        hint = f"give one of its maps: {listed}" if inside else "no .yaml of a map is in it"
+        hint = f"give one of its maps: {listed}" if inside else "it has no .yaml of a map"
         raise MapFileError(f"{str(name_or_path)!r} is a folder", hint=hint)
     raise MapFileError(
         f"no map {str(name_or_path)!r}: neither a file nor a built-in map ({', '.join(names)})",
@@ -297,7 +297,7 @@ def _index() -> dict[str, _BuiltIn]:
     return msgspec.convert(text.values, dict[str, _BuiltIn])
 
 
-# Keys whose numbers may be texts: in quotes, or written as YAML 1.1 has no number, like -.5.
+# Keys whose numbers may be texts: in quotes, or like -.5, which is no number in YAML 1.1.
 NUMBERS = ("resolution", "origin", "occupied_thresh", "free_thresh")
 
 

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 MAX_PIXELS = 64_000_000
 
-# The three formats that nav2 recommends, with PPM as Pillow's name for PGM; and JPEG, as some maps
-# are published in it. Artefacts of JPEG may turn unknown pixels beside walls into free ones.
+# The formats that nav2 recommends (Pillow calls PGM PPM), and JPEG, in which some maps are
+# published. Artefacts of JPEG may turn unknown pixels beside walls into free ones.
 FORMATS = ("PPM", "PNG", "BMP", "JPEG")
 # Size of a stripe, rounded to 8 rows: pixels, and memory per pixel [bytes].
 STRIPE_PIXELS = 500_000
@@ -148,7 +148,7 @@ def read_image(path: Path, most_bytes: int | None = None) -> MapImage:
             f"{path}: not an image (PGM, PNG, BMP or JPEG)", hint="save it as PGM or PNG"
         ) from error
     except (OSError, ValueError, SyntaxError) as error:
-        # Other errors than the system's and those of short files are about Pillow's own code.
+        # Only errors of the system and of short files are written for users.
         why = str(error) if isinstance(error, OSError) else "its content is damaged"
         raise MapFileError(
             f"{path}: not readable as an image: {why}",

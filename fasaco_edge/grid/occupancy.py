@@ -102,7 +102,7 @@ class UpdatedGrid:
     Attributes:
         grid: the map; the same object if no update fits.
         windows: windows of the updates that fit, in order.
-        faults: why the others do not fit.
+        faults: why the other updates do not fit.
     """
 
     grid: OccupancyGrid
@@ -111,7 +111,7 @@ class UpdatedGrid:
 
 
 def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
-    """Return a map of about ``most_pixels`` or fewer; a pixel is the highest of those it joins."""
+    """Return a map of about ``most_pixels`` or fewer; a pixel has the highest value it joins."""
     factor = math.ceil(math.sqrt(grid.cells.size / most_pixels))
     if factor <= 1:
         return grid

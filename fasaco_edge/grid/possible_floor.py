@@ -36,7 +36,7 @@ def possible_m2(
         thinner_m: reduction of walls on each side, the edge of a pixel of the map [m].
         at: the robot's position x, y [m].
         asked: bool (rows, cols) of the lattice: the cells whose floor counts.
-        cut_off: likewise: cells that are no longer reachable; floor connected to them counts, too.
+        cut_off: bool (rows, cols): cells no longer reachable; floor connected to them counts, too.
     """
     geometry = floor.geometry
     if geometry.rows * geometry.cols > MOST_PIXELS:

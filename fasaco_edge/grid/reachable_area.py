@@ -32,7 +32,7 @@ LOCAL_SHARE = 0.01
 class AreaChange:
     """Counts of reachable cells gained, lost, or with other steps than before.
 
-    ``window``: the smallest window around all of them; None for none.
+    ``window``: the smallest window around these cells; None for none.
     """
 
     gained: int
@@ -114,7 +114,7 @@ class ReachableArea:
         )
         if not change:
             return change
-        # Cells reachable in one of the two only, even outside the other's window.
+        # Cells reachable in only one of the areas, even outside the other's window.
         came, went = self.reachable.copy(), before.reachable.copy()
         came[here] &= ~then
         went[there] &= ~now

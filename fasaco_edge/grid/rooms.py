@@ -216,13 +216,13 @@ def _joined(
     sizes: NDArray[np.float64],
     edges: NDArray[np.float64],
 ) -> NDArray[np.int32]:
-    """Return the room of each region, with small ones joined to others.
+    """Return the room of each region; small ones join a neighbour's room.
 
     Args:
         doors: float64 (m, 5), see ``find_doors``.
         beside: int32 (m, 2), the regions on both sides of each door.
-        sizes: float64 (n,), free floor of each region [m2]; that of region 0 has no meaning.
-        edges: float64 (n,), length of its edge to unknown floor [m].
+        sizes: float64 (n,), free floor of each region [m2]; entry 0 has no meaning.
+        edges: float64 (n,), length of each region's edge to unknown floor [m].
 
     Returns:
         int32 (n,), 0 for none, ``_NOT_YET`` for little floor of a room that is half seen.

@@ -5,10 +5,10 @@ lane meets them obliquely. If the map is rotated back by that angle, cells are a
 
 Method: a histogram of gradient directions, used by O'Gorman and Clowes (1976) to find straight
 edges. Each edge between a free and an occupied pixel contributes a unit vector across it. Smoothed
-vectors are normal to the wall. Modulo a quarter-turn, most of their directions are near that of
-most walls: the peak of the histogram. The sum of the vectors around the peak gives the angle: along
-a straight wall of stepped pixels, vectors add up to its normal. Sums are of integers, so all
-machines find the same angle.
+vectors are normal to the wall. Rotated by quarter-turns into one quadrant, most of them have nearly
+the direction of most walls: the peak of the histogram. The sum of the vectors around the peak gives
+the angle: along a straight wall of stepped pixels, vectors add up to its normal. All machines find
+the same angle, because sums are of integers.
 
 Source: F. O'Gorman, M. B. Clowes, "Finding picture edges through collinearity of feature points",
 IEEE Transactions on Computers C-25(4), 1976. Deviation: only directions vote, not lines.
@@ -56,8 +56,8 @@ BETTER = 1.25
 # Walls within this angle of the pixels' axes are parallel to them [deg]. Likewise walls near 45
 # degrees are at 45 degrees, so that nearly equal maps do not rotate by 45 and by -45 degrees.
 NEAR_DEG = 0.3
-# Least useful rotation [deg]. For walls at 1 degree it takes no time, and leaves a seventh of the
-# unswept patches; for walls at 2 degrees or more it also saves time.
+# Least useful rotation [deg]. For walls at 1 degree, rotation saves no time, but leaves only a
+# seventh of the unswept patches; for walls at 2 degrees or more it also saves time.
 LEAST_ROTATION_DEG = 0.5
 
 
@@ -87,8 +87,8 @@ class WallDirection:
 def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
     """Return the direction of most walls of a map; None if there are few, or none is straight.
 
-    A wall is an edge between free and occupied pixels. On maps with few such edges, as maps of free
-    space only, it is any edge of free space.
+    A wall is an edge between free and occupied pixels. On a map with few such edges, such as a map
+    of free space only, a wall is any edge of free space.
     """
     votes = _Votes.of(grid)
     if is_of_rim := votes.rim > 4 * votes.edges:
@@ -124,7 +124,7 @@ class _Votes:
     Attributes:
         sums: int64 (3, BINS): for each bin the sums of the vectors' lengths, x and y. Vectors are
             first rotated by quarter-turns into the directions from -45 to 45 degrees.
-        edges, rim: number of free pixels' sides beside a wall, and beside something unknown.
+        edges, rim: number of free pixels' sides beside a wall, and beside an unknown pixel.
     """
 
     sums: NDArray[np.int64]
@@ -158,7 +158,7 @@ class _Votes:
         total = int(lengths.sum())
         if not total:
             return None
-        # Bins continue below and above, rotated by a quarter.
+        # Bins continue below and above, rotated by a quarter-turn.
         length, sum_x, sum_y = (
             _added_up(np.concatenate(parts), half)[BINS : 2 * BINS]
             for parts, half in (
@@ -179,7 +179,7 @@ class _Votes:
         return _Peak(round(angle_deg, 1), found / total, found)
 
 
-# Kinds of pixels, and the step from a free one to another.
+# Kinds of pixels, and their differences from a free pixel.
 _UNKNOWN, _FREE, _WALL = 0, 1, 3
 _TO_UNKNOWN, _TO_WALL = 1, 2
 
@@ -224,11 +224,10 @@ def _vote(east: NDArray[np.int16], north: NDArray[np.int16], sums: NDArray[np.in
     kept = np.flatnonzero(squares >= LEAST_SQUARE)
     x, y, squares = x.ravel()[kept], y.ravel()[kept], squares.ravel()[kept]
     # Rounding moves no vector to another bin: bins end at odd multiples of a quarter-degree, whose
-    # tangents are irrational, and y / x of such small integers is not near to one.
+    # tangents are irrational, and not near any y / x of such small integers.
     degrees = np.degrees(np.arctan2(y, x, dtype=np.float64))
     bins = np.floor((degrees + 45.0) * (BINS / 90) + 0.5).astype(np.intp) % (4 * BINS)
     for kind, values in enumerate((np.rint(np.sqrt(squares)), x, y)):
-        # Sums of integers, exact in any order.
         sums[kind] += np.bincount(bins, values, 4 * BINS).astype(np.int64)
 
 

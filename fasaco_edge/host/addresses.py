@@ -52,7 +52,7 @@ def read_address(name: str, text: str, example: int) -> Address:
     """Return the address in ``text``, the value of a key or option; localhost is 127.0.0.1.
 
     Raises:
-        BadConfiguration: it is no address with a port.
+        BadConfiguration: it is not an address with a port.
     """
     found = _ADDRESS.fullmatch(text)
     wrong = BadConfiguration(

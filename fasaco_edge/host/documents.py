@@ -33,15 +33,14 @@ _Kind: TypeAlias = Any
 _Value: TypeAlias = Any
 # Number of values that do not fit, after which the search for them ends.
 MOST_FAULTS = 50
-# Where unknown keys are allowed, least similarity to a missing key from which an unknown key counts
-# as misspelt.
+# Where unknown keys are allowed: similarity to a missing key from which a key counts as misspelt.
 ALIKE = 0.8
 
 
 class StrictDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A document, or an object in one, in which unknown keys are errors.
 
-    If it ``is_open`` it may have keys of other programs, and only misspelt ones are errors.
+    If it ``is_open``, it may have keys of other programs; only misspelt keys are errors.
     """
 
     is_open: ClassVar[bool] = False
@@ -49,8 +48,8 @@ class StrictDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     def faults(self) -> Iterator[DocumentError]:
         """Yield the faults that types do not show; keys are relative to this object.
 
-        A member whose value does not fit has its default, or is UNSET if it has none; an object or
-        list in a list is UNSET, too. UNSET is false.
+        A member whose value does not fit has its default or, without a default, is UNSET, which is
+        false. An object or list in a list becomes UNSET, too.
         """
         yield from ()
 
@@ -104,7 +103,7 @@ def misfits(held: object, error: type[_Error], key: str = "") -> Iterator[_Error
                 yield from misfits(item, error, f"{key}[{index}]")
 
 
-# What msgspec calls types and bounds, in words; and what texts and lists consist of.
+# Words for the types and bounds that msgspec names, and for the parts of texts and lists.
 _KINDS = {
     "float": "a number",
     "int": "a whole number",
@@ -143,12 +142,12 @@ class _Reader:
             and (of := _of_items(kind))
         ):
             read = self._items(of, value, key)
-        # If no part has a fault, the value itself has; but unknown keys may be of other programs.
+        # If no part has a fault, the value has one itself. Unknown keys may be of other programs.
         if len(self.faults) == before and not expected.startswith("object contains unknown"):
             expected = _expected(kind, expected)
             if isinstance(misfit, str) and re.fullmatch(r"-?\d+,\d+", misfit):
                 expected += " with a decimal point"
-            # As YAML and JSON write them, not as Python does.
+            # Null, true and false are shown as YAML and JSON write them.
             is_word = misfit is None or isinstance(misfit, bool)
             given = json.dumps(misfit) if is_word else shown(misfit)
             self._add(key + where, f"{expected}, got {given:.100}")
@@ -181,7 +180,7 @@ class _Reader:
     def _unknown(self, name: str, key: str, known: list[str]) -> tuple[str, list[str]]:
         """Return what is wrong with an unknown key, and the keys that it was meant for."""
         meant = [nested_key(key, each) for each in nearest(name, known)]
-        # It may belong elsewhere in the document.
+        # The key may belong elsewhere in the document.
         meant = meant or [path for path in _paths(self._root) if path.rpartition(".")[2] == name]
         if meant:
             return f"unknown key; did you mean {' or '.join(meant)}?", meant
@@ -200,7 +199,7 @@ def _touch(one: str, other: str) -> bool:
 
 
 def _paths(kind: type[msgspec.Struct], before: str = "") -> Iterator[str]:
-    """Yield all keys of a struct and of those in it, without lists."""
+    """Yield all keys of a struct and of the structs in it, but not of lists."""
     for field in structs.fields(kind):
         yield (path := nested_key(before, field.encode_name))
         if struct := _struct(field.type):
@@ -239,7 +238,7 @@ def _expected(kind: _Kind, expected: str) -> str:
     if words and (are_words or expected.startswith("invalid enum value")):
         words += ["a number"] if float in arms else []
         return "expected " + " or ".join(filter(None, (", ".join(words[:-1]), words[-1])))
-    # YAML 1.1 takes 8:1 for a number.
+    # YAML 1.1 reads 8:1 as a number.
     return _in_words(expected) + (", in quotes" if expected == "expected str" else "")
 
 

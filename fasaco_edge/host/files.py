@@ -141,7 +141,7 @@ def read_trusted(file: Path, user: int | None = None) -> bytes:
     """Return the content of a file in a trusted folder.
 
     Raises:
-        UntrustedFileError: others could have written it, or it is no plain file.
+        UntrustedFileError: others could have written it, or it is not a plain file.
         OSError: it is not there, or cannot be read.
     """
 

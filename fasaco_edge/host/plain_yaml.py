@@ -29,7 +29,7 @@ PIPE_S = 5.0
 
 
 class PlainYamlError(ValueError):
-    """A file is no plain YAML; the text names the place, not the file."""
+    """A file is not plain YAML; the text names the place, not the file."""
 
 
 def read_bounded(path: Path) -> str:
@@ -37,7 +37,7 @@ def read_bounded(path: Path) -> str:
 
     Raises:
         OSError: it cannot be read.
-        PlainYamlError: it is longer than ``MOST_BYTES``, or no UTF-8.
+        PlainYamlError: it is longer than ``MOST_BYTES``, or not UTF-8.
     """
     content = b""
     # Without O_NONBLOCK, opening or reading a pipe without a writer would block endlessly.
@@ -114,11 +114,11 @@ def read_written(
         path: the file.
         error: kind of the errors.
         missing: hint for a file that does not exist.
-        broken: hint for a file that is no plain YAML.
+        broken: hint for a file that is not plain YAML.
         parse: reads the values of a JSON file; None for YAML.
 
     Raises:
-        DocumentError: ``error``, the file cannot be read, or is no plain YAML.
+        DocumentError: ``error``, the file cannot be read, or is not plain YAML.
     """
     try:
         text = read_bounded(path)
@@ -169,12 +169,12 @@ def compose(text: str) -> tuple[list[tuple[str, int]], object]:
     """Return each key of a document and its line, from 1; and the document as plain values.
 
     Raises:
-        PlainYamlError: it is no YAML, or not plain.
+        PlainYamlError: it is not YAML, or not plain.
     """
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
-        # Construction adds the keys that << merges; those beside it may replace them.
+        # Construction adds the keys that << merges; keys beside << may replace them.
         keys = list(_keys_and_lines(node))
         return keys, None if node is None else loader.construct_document(node)
     except PlainYamlError:
@@ -197,7 +197,7 @@ def dump(document: object) -> str:
 _PLAIN = {
     "found character '\\t' that cannot start any token": "a tab: indent by spaces",
     "expected <block end>, but found '<block mapping start>'": (
-        "indented otherwise than the lines before"
+        "indented differently from the lines before"
     ),
     "mapping values are not allowed here": "a key within a value: perhaps the line before lacks a "
     "quote, or this one is indented too far",
@@ -205,7 +205,7 @@ _PLAIN = {
 
 
 def _described(error: yaml.MarkedYAMLError) -> str:
-    """Return where a document is no YAML, and why, in one line."""
+    """Return where a document is not YAML, and why, in one line."""
     mark, began = error.problem_mark or error.context_mark, error.context_mark
     where = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: "
     context = error.context or ""
@@ -258,12 +258,12 @@ class _Loader(yaml.SafeLoader):
 
 
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
-# As in YAML 1.2: YAML 1.1 takes 1e-6 for a text.
+# As in YAML 1.2: YAML 1.1 reads 1e-6 as a text.
 _EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes texts that ``_Loader`` would take for numbers."""
+    """Quotes texts that ``_Loader`` would read as numbers."""
 
 
 for _kind in (_Loader, _Dumper):

@@ -102,7 +102,7 @@ def cpu_seconds(pid: int) -> float:
     """Return the processor time of a process and its threads, including ended threads [s].
 
     Raises:
-        OSError: there is no such process any more.
+        OSError: the process has ended.
     """
     # As clock_getcpuclockid(3) derives the clock of a process from its id.
     return time.clock_gettime((~pid << 3) | 2)

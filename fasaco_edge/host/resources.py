@@ -15,7 +15,7 @@ def folder(name: str, package: Path = PACKAGE) -> Path:
         FileNotFoundError: this installation has no such folder.
     """
     # Only a checkout has the project file beside the package. Beside an installed package are other
-    # packages, which may be named alike.
+    # packages, which may have the same names.
     is_checkout = (package.parent / "pyproject.toml").is_file()
     beside, inside = package.parent / name, package / "_share" / name
     for found in [beside, inside] if is_checkout else [inside]:

@@ -181,7 +181,7 @@ class RasterLine:
         """Return the pixels whose centre is within ``half_px`` of the line, bool ``shape``.
 
         In each row, the pixels near a piece are a run. A counter goes up where a run begins and
-        down behind its end.
+        down after its end.
         """
         rows, cols = shape
         reach = half_px + TOUCH_TOLERANCE_PX

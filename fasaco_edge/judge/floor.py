@@ -5,8 +5,8 @@ Its inputs are a map and a line of points, no cells, walks or planners.
 Reachable floor
     All pixels that the tool's disc touches at positions that the robot's disc can reach from the
     beginning of the line. The robot fits where its disc touches only known free pixels. A tool that
-    sticks out of the robot's disc touches no floor behind a wall, but only pixels that free pixels,
-    about within the tool's disc, connect with the robot's disc.
+    sticks out of the robot's disc touches no floor behind a wall: it touches only pixels that free
+    pixels, roughly within the tool's disc, connect with the robot's disc.
 Swept floor
     The reachable floor that the tool's disc passed over along the line, by the same rules.
 Illegal share
@@ -40,7 +40,7 @@ from fasaco_edge.judge.driven_line import (
 from fasaco_edge.judge.pixels import Mask, Patches, through, within
 from fasaco_edge.text import percent
 
-# Largest pixel [m], except on maps that would have more pixels than this.
+# Largest edge of a pixel [m], except on maps that would then exceed MOST_PIXELS.
 FINE_M = 0.025
 MOST_PIXELS = 24_000_000
 SQRT2 = math.sqrt(2.0)

@@ -1,6 +1,6 @@
 """Masks of pixels: dilation by a distance, and connected patches.
 
-Exact, and of numpy alone; distances are between the centres of pixels.
+The results are exact; only numpy is used. Distances are between the centres of pixels.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Patches:
 
     Attributes:
         shape: shape of the mask.
-        starts, ends: begin and end (exclusive) of each run of marked pixels in a row, int64 (n,);
+        starts, ends: first pixel and exclusive end of each run of pixels in a row, int64 (n,);
             flat indices into rows one pixel longer than the mask's.
         of_run: index of the patch of each run, int64 (n,), 0 .. count - 1.
         count: number of patches.

@@ -1,7 +1,7 @@
 """The folder of compiled kernels: its name and its place, and whether it may be used.
 
-It is named after a hash of all kernel sources, of what compiles them and of the processor: changed
-kernels never use old code, and any installation of the same sources shares it.
+The folder is named after a hash of all kernel sources, the compilers and the processor: changed
+kernels never use old code, and all installations of the same sources share the folder.
 
 Compiled kernels are code. They are loaded only from a folder to which only root and this user can
 write, and only if each file is as it was when it was compiled (``kernels.manifest``). If the wanted
@@ -55,7 +55,7 @@ def sources_digest() -> str:
 
 
 def code_digest(version_of: Callable[[str], str] = metadata.version) -> str:
-    """Return a hash of the sources, of what compiles them and for what, 12 hex digits."""
+    """Return a hash of the sources, the compilers and the processor, 12 hex digits."""
     compilers = [f"{name} {version_of(name)}" for name in COMPILERS]
     words = [sources_digest(), sys.version, *compilers, processor()]
     return hashlib.sha256("\n".join(words).encode()).hexdigest()[:12]
@@ -81,12 +81,12 @@ def wanted_folder(environ: Mapping[str, str] = os.environ) -> Path:
     """Return the folder for compiled kernels, if it can be used.
 
     It is in the user's cache, or in ``NUMBA_CACHE_DIR``, where set (a systemd CacheDirectory, say).
-    A user without a home has the temporary folder that others fall back to.
+    A user without a home gets the temporary folder that also replaces an unusable one.
     """
     name, given = f"kernels-{code_digest()}", environ.get("NUMBA_CACHE_DIR")
     if not given:
-        # A relative path would be another folder in each working folder; so would a ``~`` that
-        # expanduser leaves as it is for a user without a home, as in a container.
+        # A relative path would name another folder in each working folder; so would a ``~`` that
+        # expanduser keeps for a user without a home, as in a container.
         homes = environ.get("XDG_CACHE_HOME", ""), os.path.expanduser("~/.cache")
         home = next(filter(os.path.isabs, homes), None)
         if home is None:
@@ -107,7 +107,7 @@ def temporary_folder() -> Path:
 
 
 def unguessable(folder: Path) -> Path:
-    """Return a path in a folder where no other user can have put a file: to judge the folder."""
+    """Return a path in a folder where no other user can have put a file."""
     return folder / secrets.token_hex(16)
 
 
@@ -165,7 +165,7 @@ def outdated(folder: Path) -> list[Path]:
 
 
 def prune(folder: Path) -> tuple[int, float]:
-    """Remove outdated folders; return how many they were and how much they held [MB]."""
+    """Remove outdated folders; return their number and their size [MB]."""
     gone, size = 0, 0
     for other in outdated(folder):
         held = sum(file.lstat().st_size for file in other.rglob("*") if file.is_file())

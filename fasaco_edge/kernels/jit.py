@@ -116,7 +116,7 @@ class _Kept:
             library._shared_module = parse_bitcode(bitcode)
 
     def log_compiling(self, kernel: Dispatcher) -> None:
-        """Log that a kernel is compiled which is not kept; the first time why."""
+        """Log that a kernel is compiled and not kept; the first time, also log why."""
         if why := self._why:
             LOG.warning("%s: %s: kernels are compiled for this process alone", self.folder, why)
             self._why = ""
@@ -152,7 +152,7 @@ class KernelLocator:
         return str(_KEPT.folder)
 
     def ensure_cache_path(self) -> None:
-        """Do nothing: the folder is there where this process writes."""
+        """Do nothing: if this process writes to the folder, it exists."""
 
     def get_source_stamp(self) -> str:
         """Return a constant as the stamp of sources: the folder's name depends on all of them."""
@@ -215,9 +215,9 @@ class _Locking(event.Listener):  # type: ignore[misc]
         self._thread = threading.local()
 
     def on_start(self, event: event.Event) -> None:
-        """Look at the folder, and have Ctrl-C wait.
+        """Check the folder, and let Ctrl-C wait.
 
-        LLVM calls back for machine code: interrupted there, it goes on without, or crashes.
+        LLVM calls Python back with machine code: an interrupt there loses the code, or crashes.
         """
         held = ExitStack()
         held.enter_context(ctrl_c_waits())
@@ -246,11 +246,10 @@ def _listen() -> None:
 def pack_loaded() -> None:
     """Take less memory for the kernels loaded so far: 40 MB less in a mission.
 
-    Beside its machine code, numba keeps the bitcode of each kernel that it loads, parsed, to link
-    it into functions that are compiled later. A mission compiles none, as the warm-up has loaded
-    all: so the bitcode stays as bytes. If a function is compiled after all, as for other types, all
-    bitcode is parsed again before, in a quarter of a second, and kept: that function links these
-    kernels as it would have.
+    numba keeps the parsed bitcode of each kernel that it loads, to link it into functions that are
+    compiled later. A mission compiles none, because the warm-up has loaded all kernels. So this
+    function keeps the bitcode as bytes. If a function is compiled after all, say for other types,
+    all bitcode is first parsed again, in a quarter of a second.
     """
     with global_compiler_lock:
         _KEPT.pack()
@@ -261,7 +260,7 @@ def compile_into(folder: Path, before_each: Callable[[int], None]) -> None:
 
     Args:
         folder: the folder; call this before kernels are imported.
-        before_each: called before each kernel is compiled, with the number compiled before it.
+        before_each: called before each kernel is compiled, with the number compiled so far.
     """
     assert not _KEPT.kernels, "kernels have another folder already"
     _KEPT.folder, _KEPT.before_each = folder, before_each
@@ -292,14 +291,14 @@ def _type_of_inner(inner: InnerKernel, _: object) -> object:
 
 
 def _compiled(function: Kernel, **options: bool) -> Kernel:
-    # The folder's name is a hash of these files alone, and says nothing of closures.
+    # The folder's name is a hash of these files alone; the values in a closure are not in it.
     is_ours = KERNELS in Path(function.__code__.co_filename).parents
     is_kept = is_ours and not function.__closure__ and _KEPT.folder is not None
     with _located_by(KernelLocator):
         compiled = numba.njit(cache=is_kept, nogil=True, no_cfunc_wrapper=True, **options)(function)
     if is_kept and not numba.config.DISABLE_JIT:
         _KEPT.kernels.append(compiled)
-        # Not before the first one is decorated: numba takes its lock for that, too.
+        # Only once a kernel is decorated: numba takes its lock while it decorates, too.
         _listen()
     return cast(Kernel, compiled)
 
@@ -311,16 +310,16 @@ def _inner(compiled: Kernel) -> Kernel:
 def kernel(function: Kernel) -> Kernel:
     """Compile ``function`` on its first call; it runs without the interpreter lock.
 
-    Nothing calls kernels from C: without that entry point they compile a fifth faster.
+    Without an entry point from C, which nothing needs, kernels compile a fifth faster.
     """
     return _compiled(function)
 
 
 def lean_kernel(function: Kernel) -> Kernel:
-    """Compile a kernel that allocates no array, nor does anything it calls.
+    """Compile a kernel that allocates no array, neither itself nor in the kernels it calls.
 
-    Without reference counts on the arrays they pass on, a loop of small functions runs four times
-    as fast.
+    Without reference counts on the arrays that are passed on, a loop of small functions runs four
+    times as fast.
     """
     return _compiled(function, _nrt=False)
 
@@ -345,7 +344,7 @@ def inlined(function: Kernel) -> Kernel:
 def as_value(number: int) -> int:
     """Return a constant as a value of its type, to call a large kernel with.
 
-    In ``f(0)`` numba gives it a type of its own, and compiles ``f``, and all that it calls in turn,
-    once for each constant.
+    In ``f(0)`` numba gives the constant a type of its own, and compiles ``f``, with all kernels
+    that it calls, once for each constant.
     """
     return number + 0

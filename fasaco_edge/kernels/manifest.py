@@ -3,13 +3,13 @@
 A power failure leaves files that are empty, truncated or full of zeros, a worn card wrong bytes;
 such machine code crashes the process, and a pickle may do anything. So the manifest has size and
 SHA-256 of each file, and files are compared with it before numba reads a byte. The manifest also
-has the stages of the warm-up that are compiled. That detects damage, but not an attack, which could
-also change the manifest: ``fasaco_edge.host.files`` checks which users could have written the
+lists the compiled stages of the warm-up. The comparison detects damage, but not an attack, which
+could also change the manifest: ``fasaco_edge.host.files`` checks which users could have written the
 folder.
 
 One process compiles at a time, as numba's own index of a function's files goes wrong where two
 write it: that process holds a lock on the folder. A file that it compiles counts once it is in the
-manifest; readers wait meanwhile. A folder without a sound manifest is begun anew.
+manifest; readers wait meanwhile. A folder without a sound manifest is cleared.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def why_missing(folder: Path, stages: Collection[str], user: int | None = None) 
 
 
 def chosen_folder(stages: Collection[str] = ()) -> tuple[Path | None, str]:
-    """Return this process's folder of kernels, None for none, and why it is not the wanted one.
+    """Return this process's folder of kernels, or None; and why it is not the wanted folder.
 
     No folder is made.
 
@@ -183,7 +183,7 @@ def compiling_into(folder: Path, waiting: Callable[[], None]) -> Iterator[Manife
 
 
 def cleared(folder: Path) -> Manifest:
-    """Remove files that the manifest lacks, or that differ from it; return that of the rest.
+    """Remove files that the manifest lacks or that differ from it; return the manifest of the rest.
 
     If a file of the manifest is lost, no stage counts as complete.
 
@@ -208,7 +208,7 @@ def record(folder: Path, manifest: Manifest, stage: str = "") -> None:
 
     Args:
         folder: the folder, whose lock this process holds.
-        manifest: the manifest before; it is updated.
+        manifest: the previous manifest; it is updated.
         stage: a stage that is complete by now.
 
     Raises:

@@ -16,8 +16,8 @@ from pathlib import Path
 from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.kernels.folder import temporary_folder, unguessable
 
-# Folders of code for one process alone: how their names begin, and an age at which they are
-# locked for certain [s].
+# Folders of code for one process alone: how their names begin, and the age by which their process
+# has surely locked them [s].
 SCRATCH, SURE_S = "fasaco-edge-scratch-", 60.0
 
 

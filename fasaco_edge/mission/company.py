@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     # For types only: an idle daemon loads no kernels.
     from fasaco_edge.grid.lattice import Cell
     from fasaco_edge.grid.reachable_area import ReachableArea
-    from fasaco_edge.mission.events import Doing, MemberReceived, State
+    from fasaco_edge.mission.events import Doing, MemberReceived
+    from fasaco_edge.states import State
 
 OpenCells = Callable[[Window], NDArray[np.bool_]]
 
@@ -41,50 +42,25 @@ class Company:
         """Take in another robot's message; return why it requires a plan, or ""."""
         return ""
 
-    def forget_ground(self) -> None:
-        """Forget the ground of others: it belongs to another map."""
-
     def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
         """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
 
         Args:
-            open_cells: returns which cells of a window still need a visit.
+            open_cells: returns which cells of a window still need a visit, except those that this
+                robot has given up.
             cell: this robot's cell.
             now: time [s].
             at_once: whether this robot is out of work.
         """
         return ""
 
-    def mine(
-        self,
-        cells: NDArray[np.bool_],
-        area: ReachableArea,
-        unvisited: NDArray[np.bool_] | None = None,
-    ) -> NDArray[np.bool_]:
-        """Return the cells that this robot has to visit.
+    def part(self, left: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_] | None:
+        """Return this robot's part of an area, bool (rows, cols); None if no others have a part.
 
-        With ``unvisited``, a part of ``cells``, return the cells on which it has to sweep floor.
-        """
-        return cells
-
-    def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_] | None:
-        """Leave this robot's part of cells tried in vain to the others, until ``try_again``.
-
-        Returns:
-            The cells that this robot has not given up; None if no others are at work.
+        ``left``: the cells that need a visit. Once this robot's part has none of them in reach, and
+        the others make no progress, the whole area is its part.
         """
         return None
-
-    def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> bool:
-        """Leave this robot's part of cells that it cannot reach to the others, until the next map.
-
-        Returns:
-            Whether there were such cells; False if no others are at work.
-        """
-        return False
-
-    def try_again(self) -> None:
-        """Clear the list of cells given up."""
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return the part of an area reachable from ``cell`` around robots in the way."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,6 +16,7 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, Command, CommandName, MissionOrder
 from fasaco_edge.mission.orders.room_requests import RoomRequest
+from fasaco_edge.states import State
 
 if TYPE_CHECKING:
     # For types only: the daemon receives events before the planners are loaded.
@@ -307,27 +307,6 @@ class Decision:
     faults: tuple[FasacoError, ...] = ()
     answers: tuple[Answer, ...] = ()
     forgotten: bool = False
-
-
-class State(StrEnum):
-    """State of the mission."""
-
-    IDLE = "idle"
-    WAITING_FOR_MAP = "waiting for map"
-    WAITING_FOR_POSE = "waiting for pose"
-    PLANNING = "planning"
-    COVERING = "covering"
-    RETURNING = "returning"
-    CHARGING = "charging"
-    PAUSED = "paused"
-    BLOCKED = "blocked"
-    DEGRADED = "degraded"
-    DONE = "done"
-
-    @property
-    def is_at_rest(self) -> bool:
-        """Whether the robot stands, and no path is published."""
-        return self not in (State.PLANNING, State.COVERING, State.RETURNING, State.DEGRADED)
 
 
 class Doing(NamedTuple):

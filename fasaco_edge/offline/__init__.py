@@ -1,1 +1,1 @@
-"""Offline planning: maps in files, one walk over each, and the line to be driven, as values."""
+"""Offline planning: a walk over a map in a file or an array, and the line to be driven."""

@@ -81,7 +81,7 @@ def floor_words(floor: FloorFigures) -> str:
 
 
 def gap_words(seconds: float, gap: float) -> str:
-    """Return as text how far a line's time [s] is above its lower bound, by ``gap`` as a share."""
+    """Return in words how far a line's time [s] is above its lower bound; ``gap``: as a share."""
     least = duration(seconds / (1.0 + gap))
     return f"{100 * gap:.0f} % above {least}, the time to sweep as much without turns or overlap"
 

@@ -152,7 +152,7 @@ class PlanGround:
 
 
 def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:
-    """Return the requested angle, or that of the walls [deg]."""
+    """Return the requested angle, or the angle of the walls [deg]."""
     if align == WALLS:
         walls = wall_direction(grid)
         return walls.rotation_deg if walls else 0.0

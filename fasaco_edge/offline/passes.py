@@ -45,7 +45,7 @@ class PassPlans:
         return f"<PassPlans {name}, {', '.join(self.names)}{swept}, {self.drive.time}>"
 
     def _repr_png_(self) -> bytes:
-        """Return the picture as PNG, as notebooks show it."""
+        """Return the picture as PNG, for notebooks."""
         return png_of(self.plot())
 
     @property
@@ -60,7 +60,7 @@ class PassPlans:
 
     @property
     def cost_s(self) -> float:
-        """Time to drive and turn along all walks' cells [s]; of the lines: ``drive.seconds``."""
+        """Time to drive and turn along all walks' cells [s]; the lines have ``drive.seconds``."""
         return math.fsum(plan.cost_s for plan in self.plans)
 
     @property

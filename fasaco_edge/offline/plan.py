@@ -80,7 +80,7 @@ def plan(
         start_xy: start point (x, y) [m] instead of ``start``. By default, a built-in map's own
             start, or the place nearest to the map frame's origin in the largest area.
         end: "anywhere", "home", or a cell.
-        line: "cells": through their centres, as the paper's planners do; "quick" or "thorough":
+        line: "cells": through cell centres, as the paper's planners do; "quick" or "thorough":
             over the floor, with 60 or 180 s as the value of a square metre. Default: "thorough";
             "cells" on a coverage grid, or by a planner other than colony-search.
         align: direction of the rows of cells for a line over the floor: "walls", "axes" or an angle

@@ -24,6 +24,7 @@ from fasaco_edge.offline.figures import (
     curve_words,
     floor_document,
     floor_words,
+    gap_words,
     judged_floor,
 )
 from fasaco_edge.offline.ground import Line, PlanGround
@@ -103,12 +104,13 @@ class Plan:
         if floor is not None and floor.swept_share is not None:
             words[0] = f"{percent(floor.swept_share)} of {floor.reachable_m2:,.1f} m2 swept"
         words.append(f"{drive.turns:,.0f} quarter-turns")
-        if drive.gap is not None:
-            words.append(f"at most {100 * drive.gap:.0f} % above the shortest time")
-        return f"<Plan {self.map.name}, {self.path.planner}: {', '.join(words)}>"
+        if floor is not None and floor.gap is not None:
+            words.append(gap_words(floor.seconds, floor.gap))
+        above = above_bound(self.path) if floor is None else ""
+        return f"<Plan {self.map.name}, {self.path.planner}: {', '.join(words)}{above}>"
 
     def _repr_png_(self) -> bytes:
-        """Return the picture as PNG, as notebooks show it."""
+        """Return the picture as PNG, for notebooks."""
         return png_of(self.plot())
 
     @property
@@ -140,12 +142,12 @@ class Plan:
 
     @property
     def cost_s(self) -> float:
-        """Time to drive and turn along the walk's cells [s]; of the line: ``drive.seconds``."""
+        """Time to drive and turn along the walk's cells [s]; the line has ``drive.seconds``."""
         return self.path.cost_s
 
     @property
     def gap(self) -> float | None:
-        """Optimality gap of ``cost_s``, as a share; None if unknown. Of the line: ``drive.gap``."""
+        """Optimality gap of ``cost_s``, as a share; None if unknown. The line has ``drive.gap``."""
         return self.path.gap
 
     @cached_property

@@ -4,8 +4,8 @@ A line is laid along each of two walks and annealed three times; then the better
 until the budget ends. The first walk and line are always completed, unless Ctrl-C cuts them. The
 steps do not depend on the budget, so a larger budget never gives a worse line (by its seconds, plus
 the price of unswept floor). If a share of the floor is requested, the first line is always annealed
-three times, to find the price of floor. A planner without local search gives one walk, until the
-budget ends.
+three times, to find the price of floor. A planner without local search searches for one walk until
+the budget ends.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
     ColonySnapshot,
     CoveragePlanner,
-    Interrupt,
     Observer,
     SearchProgress,
     StoppingCriterion,
@@ -56,7 +55,7 @@ class SearchEnd:
         bound: see below.
 
     Attributes:
-        by: what ended them.
+        by: what ended the searches.
         bound: the problem's lower bound, for planners that do not compute it.
         is_walk_limited: whether the limit on proposals ended the last search for a walk.
         is_walk_cut: whether ``budget`` or ``stop`` ended it.
@@ -93,12 +92,12 @@ class SearchEnd:
         return self.is_walk_limited
 
     def is_interrupted(self) -> bool:
-        """Return whether the user ends the plan, even within the first stage of the first line."""
+        """Return whether ``stop`` ends the plan even within the first stage of the first line."""
         if self._progress is not None:
             self._watch(self._progress)
-        asked = isinstance(self._stop, Interrupt) and self._stop.asked.is_set()
-        self.by = "Ctrl-C" if asked else self.by
-        return asked
+        is_cut = bool(getattr(self._stop, "cuts_first_line", False))
+        self.by = "Ctrl-C" if is_cut else self.by
+        return is_cut
 
     def is_stopped(self) -> bool:
         """Return whether ``stop`` ends the search for the first line, which has no budget."""

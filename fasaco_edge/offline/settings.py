@@ -39,7 +39,7 @@ class Search:
         planner: one of ``planners.registry``.
         ants, velocities, visibility, beta, alpha, tau0, seed: see ``ColonyConfig``; velocities as
             text, like 8:1.
-        q0: likewise; None for the value that suits the planner.
+        q0: see ``ColonyConfig``; None for the value that suits the planner.
         threads: number of threads of the ants; the walk is the same for any number.
         budget_s: time limit of the search for walks and a line [s]. With local search, the first
             walk and line are always completed. Default: 2 s with local search, no limit without,

@@ -62,7 +62,7 @@ def pass_words(plan: Plan) -> str:
 
 
 def _map_words(plan: Plan) -> str:
-    """Return the map's name and sides, by which a wrong resolution is seen, and its cells."""
+    """Return the map's name, its sides, which show a wrong resolution, and its cells."""
     grid, cells = plan.map.grid, plan.problem.cells
     sides = ""
     if grid is not None:

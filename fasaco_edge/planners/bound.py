@@ -82,7 +82,7 @@ class LowerBound:
         self.cost_us = max(self.cost_us, -(-doubled // (2 * unit)) * unit)
 
     def side_prices(self) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the prices of the best bound on cost, where turns cost.
+        """Return the prices of the best bound on the cost, if turns cost.
 
         Returns:
             The reachable cells, int32 (m,) flat; their prices for sides by direction,

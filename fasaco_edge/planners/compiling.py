@@ -6,8 +6,8 @@ the folder; once it has grown, it records the compiled stages and continues as a
 Kernels that are damaged, or that other users could have written, count as missing.
 
 In parallel, a second compiler compiles the stages that share few kernels with the others. It writes
-to its own folder, as two writers would damage numba's index of a function. When it has ended, the
-first compiler moves the files of functions that it lacks, and compiles the rest.
+to its own folder, as two writers would damage numba's index of a function. After its end the
+first compiler takes over the files of functions that it lacks, and compiles the rest.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ LOG = logging.getLogger(__name__)
 MODULE = "fasaco_edge.planners.compiling"
 # The compiler restarts above MOST_MB of memory, unless PLENTY_MB are available: restarts take a
 # third of the time. With the daemon's 45 MB, MOST_MB fits the unit's limit (MemoryHigh=): a fifth
-# of it are pages of libraries, which the system shares or reclaims.
+# of this memory is pages of libraries, which the system shares or reclaims.
 MOST_MB, PLENTY_MB = 270.0, 2000.0
 # Limit on restarts, in case a disk corrupts every file; 25 are usual.
 MOST_RESTARTS = 300
@@ -123,7 +123,7 @@ class CompilerProcess:
 
     @classmethod
     def start(cls, stages: Collection[str] = STAGES) -> CompilerProcess | None:
-        """Start it; None if nothing is missing, or if no folder can keep kernels (logged)."""
+        """Start the compiler; None if nothing is missing, or no folder keeps kernels (logged)."""
         if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
             return None  # kernels are not compiled
         folder, why = chosen_folder(stages)
@@ -133,7 +133,7 @@ class CompilerProcess:
         return cls(folder, stages)
 
     def lines(self) -> Iterator[tuple[str, str]]:
-        """Yield stages and reasons until it ends; log its warnings."""
+        """Yield stages and reasons until the compiler ends; log its warnings."""
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:
@@ -144,11 +144,11 @@ class CompilerProcess:
                     yield word, text
 
     def has_ended(self) -> bool:
-        """Return whether it has ended."""
+        """Return whether the compiler has ended."""
         return self._process.poll() is not None
 
     def check(self) -> None:
-        """Wait for its end.
+        """Wait for the compiler's end.
 
         Raises:
             ProcessEnded: it failed, or was killed.
@@ -160,7 +160,7 @@ class CompilerProcess:
             )
 
     def close(self) -> None:
-        """End it; the stages that it has compiled stay."""
+        """End the compiler; the compiled stages stay."""
         self._process.kill()
         self._process.wait()
 
@@ -281,7 +281,7 @@ class SecondCompiler:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def hand_over(self) -> None:
-        """Wait for its end, and move the files of functions that only it has compiled.
+        """Wait for the second compiler, and move the files of functions that only it has compiled.
 
         If it failed, nothing is moved, and the first compiler compiles all functions.
 

@@ -40,7 +40,7 @@ class Turns(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class CoverageCost:
-    """Seconds a robot needs for a step and for a quarter-turn; a half turn is two of these.
+    """Seconds a robot needs for a step and for a quarter-turn; a half turn is two of the latter.
 
     Searches compare whole microseconds, whose sums are exact in any order, so the same search
     always finds the same walk. By default only steps cost.

@@ -42,7 +42,7 @@ BACKWARD_FACTOR = 2.0
 SWEPT_AGAIN = 2.5
 # Number of start directions of a robot whose heading is not known.
 HEADINGS = 8
-# Largest distance of the points of an arc [m].
+# Largest distance between neighbouring points of an arc [m].
 STEP_M = 0.05
 # Largest bend between two lanes that the robot steers; a larger bend becomes an arc or, at worst, a
 # turn on the spot [rad].
@@ -65,7 +65,7 @@ class Curve:
         is_backward: bool (n - 1,): whether each segment is driven backward.
         legs: int64 (n,): for a pose on a straight of the line, the index of the line's point before
             it; below 0 for poses beside the line.
-        spots: number of turns that do not fit, and stay on the spot.
+        spots: number of turns that no arcs can replace: they stay turns on the spot.
     """
 
     poses: Floats
@@ -191,7 +191,7 @@ class _Search:
         return self._drawn(self._states(ways), ways)
 
     def _places(self, points: Floats, headings: Floats) -> kernel.LinePlaces:
-        """Return the places to start from, and those along a line without repeated points."""
+        """Return the places to start from, and the places along a line without repeated points."""
         legs = np.diff(points, axis=0)
         lengths = np.hypot(*legs.T)
         parts = np.maximum(np.ceil(lengths / (SPACING * self._radius)), 1).astype(np.int64)
@@ -249,7 +249,7 @@ class _Search:
         return ways
 
     def _states(self, ways: kernel.Ways) -> list[int]:
-        """Return the states of the cheapest way; it may end shortly before the line does."""
+        """Return the states of the cheapest way, which may end shortly before the line."""
         way, worth_s = self._line.way, self._line.worth_s
         left_s = np.append(np.cumsum(worth_s[:0:-1])[::-1], 0.0)
         left_s[way < way[-1] - (0.0 if self._is_end_fixed else self._window)] = np.inf
@@ -290,7 +290,7 @@ class _Search:
             poses[-1], legs[-1] = self._pose(state), int(self._line.leg[state >> 1])
         drawn, is_backward = np.array(poses), np.array(backward, np.bool_)
         kept = _needed(drawn, is_backward, LEAST_M / self._floor.geometry.resolution)
-        # If poses before a kept one were dropped, its segment has the direction of its last part.
+        # If poses were dropped, a segment takes the direction of its last part.
         spots = len(self._spots(states, ways))
         return self._as_curve(drawn[kept], is_backward[kept[1:] - 1], np.array(legs)[kept], spots)
 
@@ -315,7 +315,7 @@ class _Search:
     ) -> Curve:
         xy, last = raster_to_map(self._floor.geometry, poses[:, 1::-1]), len(self._corners) - 1
         yaw = np.remainder(poses[:, 2] + self._yaw + np.pi, 2.0 * np.pi) - np.pi
-        # A straight may lead through further points of the line.
+        # A straight may continue over further points of the line.
         legs = np.where(legs < 0, legs, self._corners[np.minimum(legs + 1, last)] - 1)
         placed: Floats = np.column_stack([xy, yaw]).round(DECIMALS)
         return Curve(placed, is_backward, legs, spots)

@@ -71,7 +71,7 @@ def _nowhere(grid: OccupancyGrid | None) -> NothingToCover:
     return NothingToCover(
         f"no pixel of the map is free, {percent(unknown, 0)} are unknown",
         hint="check image, negate, mode and free_thresh of the map's YAML file: free pixels are "
-        "white" + ("; `plan --unknown-free` takes unknown ones for free" if unknown else ""),
+        "white" + ("; `plan --unknown-free` takes unknown pixels for free" if unknown else ""),
     )
 
 
@@ -95,7 +95,7 @@ def start_point(map_file: Path, truth: OccupancyGrid, radius_m: float) -> tuple[
 
 
 def _is_free_around(grid: OccupancyGrid, point: tuple[float, float], radius_m: float) -> bool:
-    """Return whether all pixels whose centres are within a radius, or a pixel, are free."""
+    """Return whether all pixels within a radius, of one pixel at least, are free."""
     geometry = grid.geometry
     col, row = geometry.to_pixels(*point)
     if not (0 <= col < geometry.cols and 0 <= row < geometry.rows):
@@ -114,7 +114,7 @@ MAP_FOOTPRINT = Footprint(cell_m=0.3, robot_radius_m=0.18)
 
 @dataclass(frozen=True, slots=True)
 class NamedGrid:
-    """A lattice with its start cell, and the name or file it was requested by."""
+    """A lattice, its start cell, and the requested name or file."""
 
     name: str
     lattice: CoverageLattice

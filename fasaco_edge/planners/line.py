@@ -132,7 +132,7 @@ class LineSearch:
     Each later stage anneals the line again, twice as long as the previous one. The search keeps the
     line of the least cost, so a longer search along the same walk is never worse. If a share of the
     floor is requested, it keeps the fastest line that sweeps this share; without such a line, the
-    one that sweeps most. Each stage then adapts the price of floor.
+    line that sweeps most. Each stage then adapts the price of floor.
 
     Attributes:
         best: the line kept; None until the first stage is over, or ``keep`` is called in it.
@@ -289,7 +289,7 @@ def left_in_blocks(counts: NDArray[np.int16]) -> NDArray[np.int32]:
     """Return the number of unswept pixels in each block, of sweep counts (rows, cols)."""
     left = np.empty(blocks_of(counts.shape), np.int32)
     side = 1 << BLOCK
-    # Number of rows that fit in a cache; a byte has the pixels of a row of a block.
+    # Number of rows that fit in a cache; a byte holds a row of a block.
     rows = max(CACHED // (side * counts.shape[1]), 1)
     for first in range(0, len(left), rows):
         part = counts[side * first : side * (first + rows)]

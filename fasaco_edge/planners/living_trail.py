@@ -4,17 +4,17 @@ The ants of each plan, and of each attempt in spare time, start from the trail, 
 to the next ants. The equations are those of Carr and Wang 2022:
 
 * equation (7), local update: applied by each ant (``kernels.ants``) and at each change of the map.
-  A driven step loses half of its pheromone at once;
-* equation (8), global update: ants apply it along what they rebuilt, and each published plan along
-  its path; the other steps at the path's cells fade by (7).
+  Driving a step also halves its pheromone;
+* equation (8), global update: ants apply it along discs that they rebuilt, each published plan
+  along its path; the other steps at the path's cells fade by (7).
 
 Delta phi = (distinct cells x step cost) / path cost, about 1 at best, as in
 ``planners.paper.fasaco``; a step that a path takes twice is strengthened once.
 
 A trail spans the lattice's window of cells; new steps begin at tau0, removed steps vanish. The time
 of an update depends on the length of the path or the size of the change. Values are float32 and
-computed one by one, so they are equal on every machine. Imports no numba, as the ledger holds a
-trail.
+computed one by one, so they are equal on every machine. This module imports no numba, so that a
+ledger, which holds a trail, can be read without it.
 """
 
 from __future__ import annotations
@@ -112,8 +112,8 @@ class LivingTrail:
         Args:
             window: window of the lattice.
             steps: step masks, (rows, cols).
-            changed: int32 (n, 2), cells (row, col) changed since the last lattice; there the rest
-                of the trail fades by equation (7). None if unknown: steps are compared.
+            changed: int32 (n, 2), cells (row, col) changed since the last lattice; their remaining
+                pheromone fades by equation (7). None if unknown: steps are compared.
         """
         if window != self._window:
             self._tau = _carried(self._tau, self._window, window)
@@ -147,7 +147,7 @@ class LivingTrail:
         """Strengthen a path's steps by equation (8); the other steps at its cells fade by (7).
 
         Args:
-            cells: int32 (n, 2), the path's cells (row, col); those off the lattice, and moves that
+            cells: int32 (n, 2), the path's cells (row, col); cells off the lattice, and moves that
                 are no legal step, are skipped.
             amount: delta phi.
         """

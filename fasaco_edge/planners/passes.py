@@ -35,11 +35,11 @@ class Pass:
     """A pass over the floor.
 
     Attributes:
-        covers: which cells: all; those along edges; or the rest, after edges are covered.
-        lanes: their direction: auto or cross.
-        angle_deg: their angle to the x axis of the map frame in place of ``lanes`` [deg].
-        overlap: share of the tool's width by which its lanes overlap; None for the robot's.
-        speed_m_s: speed of the robot [m/s]; None for its usual one.
+        covers: the cells to cover: all, those along edges, or the rest after the edges.
+        lanes: direction of its lanes: auto or cross.
+        angle_deg: angle of its lanes to the x axis of the map frame in place of ``lanes`` [deg].
+        overlap: share of the tool's width by which its lanes overlap; None for the robot's overlap.
+        speed_m_s: speed of the robot [m/s]; None for its usual speed.
     """
 
     covers: Covers = "all"
@@ -50,7 +50,7 @@ class Pass:
 
     @property
     def name(self) -> str:
-        """How it differs from a usual pass, as text; "" if it does not."""
+        """How the pass differs from a usual pass, as text; "" if it does not."""
         angle = "cross" if self.lanes == "cross" else ""
         if self.angle_deg is not None:
             angle = f"{self.angle_deg:g} degrees"
@@ -66,7 +66,7 @@ class Laid(NamedTuple):
         covers: as ``Pass.covers``.
         lanes: direction of its lanes on the lattice.
         angle_deg: angle of the lattice's rows to the x axis of the map frame [deg]; None for the
-            usual one.
+            usual angle.
         overlap: as ``Pass.overlap``.
     """
 
@@ -117,7 +117,7 @@ def laid(passes: Sequence[Pass]) -> list[Laid]:
 
 
 def _is_crossed(after: Iterable[Pass]) -> bool:
-    """Return whether the first of some passes that has lanes crosses the previous lanes."""
+    """Return whether the first pass with lanes crosses the lanes before it."""
     return next((each.lanes == "cross" for each in after if each.covers != "edge"), False)
 
 
@@ -173,9 +173,9 @@ def read_pass(text: str) -> Pass:
     is_overlap = overlap is None or 0.0 <= overlap <= MOST_OVERLAP
     if not (is_angle and is_speed and is_overlap):
         raise BadConfiguration(
-            f"a pass is edge, rest, auto, cross, an angle as 30deg up to {MOST_ANGLE_DEG:g}, "
-            f"rest:cross; with %30 for an overlap up to {100 * MOST_OVERLAP:g} percent, and @0.15 "
-            f"for a speed up to 10 m/s behind it; got {text!r}"
+            f"a pass is edge, rest, auto, cross, rest:cross, or an angle such as 30deg, up to "
+            f"{MOST_ANGLE_DEG:g}; then %30 for an overlap, up to {100 * MOST_OVERLAP:g} percent, "
+            f"and @0.15 for a speed, up to 10 m/s; got {text!r}"
         )
     direction: Direction = "cross" if lanes == "cross" else "auto"
     return Pass(covers, direction, angle_deg, speed_m_s, overlap)  # type: ignore[arg-type]

@@ -21,7 +21,7 @@ class Saved(NamedTuple):
     """Savings of a search against its first walk [s].
 
     Attributes:
-        ants: by walks of ants, including local search on these.
+        ants: by ants, including local search on their walks.
         local_search: by local search on the first walk, or on the rest of the previous walk.
         by_velocity: ``ants`` by cohort: the velocity of each, and its savings.
     """

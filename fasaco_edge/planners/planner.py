@@ -46,7 +46,8 @@ class SearchProgress:
 
 
 # Called repeatedly while a search runs; True ends it with the best walk so far, which always
-# exists.
+# exists. A plan completes its first line all the same, unless a criterion has an attribute
+# ``cuts_first_line`` that is true.
 StoppingCriterion = Callable[[SearchProgress], bool]
 
 
@@ -85,12 +86,17 @@ class Interrupt:
     def __call__(self, progress: SearchProgress) -> bool:
         return self.asked.is_set()
 
+    @property
+    def cuts_first_line(self) -> bool:
+        """Whether it stops a plan even before its first line is complete."""
+        return self.asked.is_set()
+
 
 @dataclass(slots=True)
 class StopRecorder:
-    """Asks another criterion, and records at which calls it stops; ``StopAt`` stops at the same.
+    """Passes on what another criterion decides, and records the calls that stop, for ``StopAt``.
 
-    A path's work does not reproduce it: a repair and the search after it may both stop.
+    Counts of work do not reproduce such a path: a repair and the search after it may both stop.
 
     Attributes:
         criterion: the criterion asked.

@@ -1,7 +1,7 @@
 """Coverage problem: cells to cover, start, cost; and its arrays for the kernels.
 
 In these arrays a cell is a flat index. Ants walk on ``Graph``, the plain lattice; local search
-works on ``FramedGround``, the lattice with a border of one cell.
+works on ``FramedGround``, the lattice with a border of two cells.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class CoverageProblem:
         attempt: number of an attempt to improve a valid ``before``, from 1; each attempt tries
             other places. 0 if a plan is needed.
         trail: the mission's living trail, for planners whose ants start from it; None for none.
-        whole: the whole problem, if this is its rest after some steps, see ``after``; a path then
+        whole: the whole problem, if this is its rest after some steps, see ``after``; then a path
             begins with these steps, and has the figures of the whole problem. None for a whole
             problem.
         rooms: uint16 (rows, cols), the room of each cell, 0 for none; None without a price for
@@ -195,7 +195,7 @@ class CoverageProblem:
         return self.cost.of_walk_us(cells) + self._rooms_us(cells)
 
     def _rooms_us(self, cells: NDArray[np.int32]) -> int:
-        """Return the prices added to a walk's steps into other rooms [us]."""
+        """Return the prices of a walk's steps into other rooms [us]."""
         if self.rooms is None:
             return 0
         rooms = self.lattice.window.values_at(self.rooms, cells, 0)
@@ -203,7 +203,7 @@ class CoverageProblem:
 
     @property
     def steps_with_rooms(self) -> NDArray[np.uint8]:
-        """The steps of the lattice, with marks of those into another room, see ``ROOM_BITS``."""
+        """The steps of the lattice, with marks on steps into another room, see ``ROOM_BITS``."""
         steps, rooms = self.lattice.steps, self.rooms
         if rooms is None:
             return steps
@@ -216,7 +216,7 @@ class CoverageProblem:
         return steps | (into & steps) << np.uint8(ROOM_BIT)
 
     def _added_us(self, walk: NDArray[np.int32]) -> int:
-        """Return the prices added to a walk's steps by their direction [us]."""
+        """Return the additional prices of a walk's steps by their direction [us]."""
         cost, steps = self.cost, walk.size - 1
         if not cost.has_lanes:
             return 0
@@ -332,12 +332,12 @@ class FramedGround:
         return self.cols + 2 * FRAME
 
     def framed(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Convert flat indices of the lattice, int32 (n,), to those of the framed one."""
+        """Convert flat indices of the lattice, int32 (n,), to those of the framed lattice."""
         row, col = np.divmod(walk, np.int32(self.cols))
         return self.framed_at(row, col)
 
     def framed_at(self, rows: NDArray[np.int32], cols: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return cells by rows and columns of the lattice as flat indices of the framed one."""
+        """Return cells by rows and columns of the lattice as flat indices of the framed lattice."""
         return ((rows + FRAME) * self.width + cols + FRAME).astype(np.int32, copy=False)
 
     def unframed(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -27,7 +27,7 @@ def stages_of_plan(planner: str, *, has_curves: bool = False) -> tuple[str, ...]
 
 
 def stages_of_mission(planner: str, *, has_fleet: bool, has_curves: bool) -> tuple[str, ...]:
-    """Return the stages that a mission needs, by its planner's name; others take memory."""
+    """Return the stages that a mission needs, by its planner's name; others would take memory."""
     needed = {planner, *((SHARES,) if has_fleet else ()), *((CURVES,) if has_curves else ())}
     spared = {*PLANNER_NAMES, SHARES, CURVES} - needed
     return tuple(stage for stage in STAGES if stage not in spared)

@@ -50,7 +50,7 @@ def completed_from(
 def framed_cells(
     problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32]
 ) -> NDArray[np.int32]:
-    """Return the cells of ``before`` that are still on the lattice, as framed ones."""
+    """Return the cells of ``before`` that are still on the lattice, as framed cells."""
     window = problem.lattice.window
     rows, cols = before[:, 0] - window.row0, before[:, 1] - window.col0
     inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)

@@ -126,8 +126,8 @@ def charges_of(review: Review) -> list[Charge]:
 
 
 PLOTTED = {
-    "memory_mb_max": f"{entities.MEMORY}/planner",
-    "recorder_memory_mb_max": f"{entities.MEMORY}/recorder",
+    "memory_mb_max": entities.DAEMON_MEMORY,
+    "recorder_memory_mb_max": entities.RECORDER_MEMORY,
 }
 """Members that are the maximum of a curve, and the curve."""
 

@@ -62,7 +62,7 @@ class ReviewDocument(msgspec.Struct):
         time_scale: simulated seconds per second; 1 for a real robot. Times and durations in [s] are
             by the robot's clock, unless described otherwise; those in [ms] are by the computer's.
         duration_s: duration of the recording [s].
-        recorded_s: the same by the computer's clock [s].
+        recorded_s: duration of the recording by the computer's clock [s].
         state: last state of the mission.
         orders: each order: ordered (`command`, or `itself` for an order without a command), at_s,
             until_s, ended_by (`start` of another order, `cancel`, `reset`; null for the end of the
@@ -78,9 +78,9 @@ class ReviewDocument(msgspec.Struct):
             skip (whether orders for everything leave it out).
         complete: whether the mission reached `done` in the last order, with every reachable cell
             (of its zones) covered.
-        covered_cells, coverable_cells: numbers of covered and of reachable cells at the end, by the
-            daemon's last recorded count; if the order has zones, in these; other robots of the
-            fleet included.
+        covered_cells, coverable_cells: numbers of covered and of reachable cells at the end, in the
+            zones of the order, if it has any, by the daemon's last recorded count. Cells covered by
+            other robots of the fleet are included.
         recovered_cells: number of cells covered more than once.
         unreachable_cells: number of cells where the robot would fit, but that it cannot reach.
         reachable_m2, swept_m2: floor at the end, in pixels of the last map [m2]. Reachable is what
@@ -103,7 +103,7 @@ class ReviewDocument(msgspec.Struct):
             covered [s].
         driven_m: length of the track, without jumps [m].
         paths: number of published paths.
-        replans: number of paths from a plan, without the first one after each start of the daemon.
+        replans: number of paths from a plan, without the first after each start of the daemon.
         replans_by_reason: number of replans by kind of reason.
         first_plan_ms: duration of the first plan [ms].
         replan_ms_p50, replan_ms_p99, replan_ms_max: percentiles of the duration of replans, by
@@ -125,7 +125,7 @@ class ReviewDocument(msgspec.Struct):
         longest_stand: the longest standstill during a mission: at_s, seconds, place (x, y) [m], and
             the states of the mission meanwhile; null for none.
         faults: number of messages refused by the daemon.
-        faults_by_code: the same by code.
+        faults_by_code: number of these messages by error code.
         recorder_lost: number of samples that the recorder could not write, by its own count.
         samples_missing: number of samples missing, by gaps in their sequence numbers.
         unreadable: number of samples in the recording that could not be decoded, by topic.

@@ -29,6 +29,7 @@ from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.orders.zones import cells_inside, with_kept_out
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import RunData
+from fasaco_edge.states import Activity, states_of
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.rooms import RoomReport
 from fasaco_edge.wire.documents.settings import known_settings
@@ -36,7 +37,7 @@ from fasaco_edge.wire.documents.settings import known_settings
 MILESTONES = (50, 90, 99, 100)
 """Shares of the cells that are coverable at the end [percent]."""
 # States in which the robot is not at work.
-RESTS = ("idle", "done", "paused", "charging", "loading", "waiting for map", "waiting for pose")
+RESTS = states_of(Activity.NONE, Activity.HELD)
 
 
 def visits_of(
@@ -48,7 +49,7 @@ def visits_of(
 
     Args:
         poses: times [s], and x, y [m] and yaw [rad].
-        lost_pose_s: the track is broken where no pose came for this time [s]; 0 for nowhere.
+        lost_pose_s: the track is broken where no pose came for this time [s]; 0: never.
         lattice: the cells.
     """
     ledger, before = CoverageLedger(lattice.cell_m), math.inf
@@ -99,7 +100,7 @@ def swept_floor(
         return None
     tool_m = known_settings(data.config).robot.tool_width_m
     robot = SweepingRobot(tool_m, footprint.robot_radius_m, free_at_most=footprint.free_at_most)
-    # Floor is reachable if it is so from the robot's last position; the same holds for cells.
+    # Floor and cells are reachable if the robot can reach them from its last position.
     x, y = track[-1].tolist()
     grid = with_kept_out(data.grid, data.keep_out if keep_out is None else keep_out)
     return judge_floor(grid, track, robot, driven=kept.driven, stands_at=(x, y))
@@ -159,7 +160,7 @@ def room_chapters(
     labels = labels_of(geometry, [room.outline for room in rooms])
     at = geometry.values_at(labels, data.track[:, :2])
     seconds = np.bincount(at[:-1], _work_s(data, states), len(rooms) + 1) if len(at) else None
-    # 0 is in no room: doors, and floor beside furniture.
+    # 0 is no room: doors, and floor beside furniture.
     passed = at[at > 0]
     entered = np.bincount(passed[np.diff(passed, prepend=0) != 0], minlength=len(rooms) + 1)
     pixel_m2, done, left = geometry.resolution**2, None, None

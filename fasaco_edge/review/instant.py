@@ -1,7 +1,7 @@
 """One moment of a recorded mission: robot, paths before and after, map, command.
 
-It shows why the robot acted as it did then. Maps are decoded again up to that time. Paths are
-read from their drawings; of paths in quick succession, some have none.
+It shows why the robot acted as it did then. Maps are decoded again up to that time. Paths are read
+from their drawings; not all paths in quick succession are drawn.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class InstantPicture(msgspec.Struct, frozen=True):
 
 
 def instant_at(review: Review, at_s: float) -> InstantPicture:
-    """Return what a picture of a time [s] shows.
+    """Return the instant at a time [s], with the data of its picture.
 
     Raises:
         UnreadableRecording: a file of the recording is gone.

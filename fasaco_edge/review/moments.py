@@ -13,16 +13,14 @@ import msgspec
 import numpy as np
 
 from fasaco_edge.review.run_data import PathSample, RunData, StatusSample
+from fasaco_edge.states import TROUBLED, Activity, states_of
 
 # Smaller changes of the pose do not count as motion.
 STILL_M = 0.05
 STILL_RAD = 0.1
 # States without work for the robot.
-AT_REST = (
-    *("idle", "waiting for map", "waiting for pose"),
-    *("loading", "charging", "done", "silent"),
-)
-TROUBLES = ("degraded", "blocked", "silent")
+AT_REST = {*states_of(Activity.NONE, Activity.CHARGING), "silent"}
+TROUBLES = {*TROUBLED, "silent"}
 RECORDER_IN_ORDER = ("recording", "stopping")
 # Beginning of the details in a reason: "path blocked at cell (2, 3)" has the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")

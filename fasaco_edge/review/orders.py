@@ -18,12 +18,15 @@ from fasaco_edge.mission.orders.passes import passes_words
 from fasaco_edge.recording.scene.runcard import cells_of
 from fasaco_edge.review.moments import Replans, Span
 from fasaco_edge.review.run_data import RunData
+from fasaco_edge.states import Activity, states_of
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.replies import UnreachedArea, ZoneReport
 
 ENDS = ("cancel", "reset")
-# States without an order in force: in them even the same order begins anew.
-OVER = ("done", "idle")
+# States without an order in force: in these states even an equal order begins anew.
+OVER = states_of(Activity.NONE, Activity.NONE)
+# States without work, before a mission or in a gap of the recording.
+NOT_BEGUN = {*states_of(Activity.NONE, Activity.STARTING), "silent"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +75,6 @@ def _document(order: MissionOrder) -> OrderDocument:
 
 
 def order_words(order: OrderDocument) -> str:
-    """Return an order as text."""
     asked = [f"zone {zone.name}" + passes_words(zone.passes or 1) for zone in order.zones] or [
         "everything" + passes_words(order.passes or 1)
     ]
@@ -165,10 +167,8 @@ def _state_at(states: Sequence[Span], at_s: float) -> str:
 
 
 def _has_begun(states: Sequence[Span], begin_s: float, end_s: float) -> bool:
-    idle = (*OVER, "loading", "waiting for map", "waiting for pose", "silent")
-    return any(
-        span.name not in idle and span.begin_s < end_s and span.end_s > begin_s for span in states
-    )
+    during = (span for span in states if span.begin_s < end_s and span.end_s > begin_s)
+    return any(span.name not in NOT_BEGUN for span in during)
 
 
 def _chapter(

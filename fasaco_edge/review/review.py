@@ -110,7 +110,7 @@ class Review:
         visits: number of passes of the tool over each cell, uint16 in the shape of the lattice.
         floor: swept and unswept pixels of the reachable floor that was ordered; None without a
             lattice, or if cells were covered before a restart.
-        all_floor: the same for all reachable floor, ordered or not.
+        all_floor: as ``floor``, but of all reachable floor, ordered or not.
         by_others: reachable floor that other robots of the fleet swept, bool (rows, cols); it is
             part of neither ``floor`` nor ``all_floor``. None for a robot alone, or if unknown.
         replans: plans after the first one.

@@ -138,7 +138,7 @@ class RunData:
 
     @property
     def ordered_floor(self) -> FloorReport | None:
-        """The same, before an order was cancelled: after that, no floor has to be swept."""
+        """The daemon's last report before a cancellation, after which no floor has to be swept."""
         held = self.last(lambda s: s.floor if s.floor and s.floor.reachable_m2 else None)
         return held or self.ledger_floor
 
@@ -176,7 +176,7 @@ class RunData:
 
     @property
     def jumps(self) -> NDArray[np.bool_]:
-        """Whether the pose jumped from each to the next, bool (n - 1,)."""
+        """Whether the robot jumped from each pose to the next, bool (n - 1,)."""
         jump_m = JUMP_CELLS * self.footprint.cell_m if self.footprint else math.inf
         return self.lengths_m > jump_m
 

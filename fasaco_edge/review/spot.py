@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 SWEPT_BY_OTHERS = "swept by others"
 # A path sweeps a spot this far inside the edge of the tool [m].
 NEAR_M = 0.02
-# The mission's reason for a path with the same walk and another line.
+# The mission's reason for a path with the same walk and an improved line.
 POLISHED = "line polished"
 # Limits on the listed patches: their number, and their least area [m2].
 MOST_PATCHES, LEAST_M2 = 8, 0.04
@@ -191,7 +191,7 @@ class _Judge:
         return None
 
     def _out_of_reach(self, grid: OccupancyGrid, footprint: Footprint) -> Spot:
-        """Return why the tool cannot reach it."""
+        """Return the spot with the reason why the tool cannot reach it."""
         lattice = self._review.lattice
         if self._data.keep_out and lattice is not None:
             free = swept_floor(self._data, lattice, keep_out=())
@@ -256,8 +256,8 @@ class _Judge:
             words = f"the map showed it free from {clock(seen_s)} on, and then no path led there"
         elif before_m2 := self._data.swept_before_m2:
             words = (
-                f"no path of the recording led over it; when that began, {before_m2:.1f} m2 had "
-                "been swept, perhaps this among them"
+                f"no path of the recording led over it; before the recording {before_m2:.1f} m2 "
+                "were swept, perhaps this spot, too"
             )
             return self._spot("not known", f"{words}; {by}", swept=None)
         else:
@@ -272,8 +272,8 @@ class _Judge:
         data = self._data
         away_m = np.hypot(*(data.track[:, :2] - (self._x, self._y)).T)
         via_m, way_m = away_m[:-1] + away_m[1:], data.lengths_m
-        # The longest detour at full speed, but not longer than the way from pose to pose: a robot
-        # that hardly moved probably stood.
+        # The longest detour at full speed, at most as long as the way itself: a robot that hardly
+        # moved probably stood.
         speed_m_s = known_settings(data.config).robot.speed_m_s
         detour_m = np.clip(speed_m_s * np.diff(data.times) - way_m, 0.0, way_m)
         gaps = np.flatnonzero(~data.driven & (via_m <= way_m + detour_m + self._tool_m))

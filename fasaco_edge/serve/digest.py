@@ -15,6 +15,7 @@ from fasaco_edge.grid.geometry import Bounds, Polygon
 from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.serve import plain
 from fasaco_edge.serve.last_order import again, order_of, room_of, rooms_of
+from fasaco_edge.states import Activity, states_of
 from fasaco_edge.wire.documents.json_text import Corners
 from fasaco_edge.wire.documents.replies import FloorReport, MissionReport, ZoneReport
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
@@ -31,8 +32,7 @@ MOST_CORNERS = 1_000
 MOST_TO_GO_S = 1e8
 # Coordinates beyond this are invalid [m].
 MOST_M = 1e6
-# States with a path to drive.
-UNDERWAY = ("planning", "covering", "returning", "degraded", "paused", "charging")
+DRIVING = states_of(Activity.DRIVING)
 
 
 def state(
@@ -62,7 +62,8 @@ def state(
         order = order_of(view, ordered.mission)
     return found | {
         "state": status.state,
-        "word": plain.WORDS.get(status.state, status.state),
+        "look": plain.look(status),
+        "word": plain.word(status.state),
         "does": plain.last_seen(status) if absent else plain.does(status),
         "needs": plain.needs(status),
         "left": [
@@ -79,7 +80,6 @@ def state(
         "mission": _mission(view, status),
         "again": again(order),
         "battery": battery and {"level": battery.level, "power": battery.power},
-        "in_trouble": bool(status.troubles),
         "faults": list(_faults(status)),
         "fleet": _fleet(status.fleet) if status.fleet else None,
         "radius_m": view.settings.robot.radius_m,
@@ -119,10 +119,10 @@ def _floor(floor: FloorReport) -> Digest:
 
 def _to_go_s(view: RobotState, status: Status) -> int | None:
     path = status.path
-    if status.state not in UNDERWAY or view.gone_since is not None or path is None:
+    if view.gone_since is not None or path is None:
         return None
-    # Without steps only a paused robot will go on with its line.
-    is_driven = path.steps or status.state == "paused"
+    # At rest only a paused robot will continue on its line.
+    is_driven = status.state == "paused" or (path.steps and status.state in DRIVING)
     left_s = path.line_s if is_driven else None
     return None if not left_s or left_s > MOST_TO_GO_S else round(left_s)
 
@@ -155,8 +155,8 @@ def _mission(view: RobotState, status: Status) -> Digest:
 
 
 def _share(zone: ZoneReport, room: RoomReport | None, status: Status) -> float | None:
-    """Return the share of a zone: of the room's floor, as on the map, else of all the order's floor
-    if it has no other zone, else of cells; None if the zone has none."""
+    """Return the done share of a zone: of the room's floor, as on the map; else of the order's
+    floor, if it has no other zone; else of the zone's cells, None if it has none."""
     if room is not None and room.swept is not None:
         return room.swept
     floor = status.floor
@@ -201,7 +201,7 @@ def _fleet(fleet: FleetReport) -> list[Digest]:
     return [
         {
             "name": member.name,
-            "does": "away" if member.away else plain.WORDS.get(member.state, member.state),
+            "does": "away" if member.away else plain.word(member.state),
             "away": member.away,
         }
         for member in fleet.members[:MOST_ROBOTS]
@@ -239,7 +239,7 @@ def _is_polygon(corners: Corners) -> bool:
 def lately(events: EventLog) -> list[Digest]:
     """Return the documents of the newest events, the newest first."""
     entries = list(events.entries)[-MOST_ENTRIES:]
-    # The page shows wall-clock times; entries have monotonic ones.
+    # The page shows wall-clock times; entries have monotonic times.
     offset = time.time() - phrases.steady_now()
     return [
         {"at_s": round(entry.at_s + offset, 1), "text": entry.text, "tone": entry.tone}

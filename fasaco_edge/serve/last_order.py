@@ -9,18 +9,18 @@ from fasaco_edge.grid.geometry import polygon_bounds
 from fasaco_edge.wire.documents.replies import MissionReport, ZoneReport
 from fasaco_edge.wire.documents.rooms import RoomReport
 
-# An area is the room of its name if their bounds differ by less [m]: outlines change as maps grow.
+# A zone is the room of its name if their bounds differ by less [m]: outlines change as maps grow.
 NEAR_M = 0.5
 
 
 def rooms_of(view: RobotState) -> dict[str, RoomReport]:
-    """Return the rooms that zones of an order may be, by their titles."""
+    """Return the rooms that zones of an order may name, by their titles."""
     configured = {zone.name for zone in view.settings.mission.zones}
     return {room.title: room for room in view.rooms.rooms if room.title not in configured}
 
 
 def room_of(zone: ZoneReport, rooms: dict[str, RoomReport]) -> RoomReport | None:
-    """Return the room that a zone of an order is; None for an area, also with a room's name."""
+    """Return the room that a zone of an order names; None for an area with a room's name."""
     room = rooms.get(zone.name)
     if room is None or not (zone.polygon and room.outline):
         return room
@@ -29,7 +29,7 @@ def room_of(zone: ZoneReport, rooms: dict[str, RoomReport]) -> RoomReport | None
 
 
 def order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:
-    """Return the order in a status, for an order commanded before this server began; else None.
+    """Return the order in a status; None without an order by command.
 
     A zone with name and bounds of a room is that room. The status has the number of passes, not
     their kinds.
@@ -54,7 +54,7 @@ def order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:
 
 
 def again(order: dict[str, Any] | None) -> dict[str, object] | None:
-    """Return the last order by command, which the user can repeat once it is over; else None.
+    """Return the last order by command, which the user can repeat once it is over; None if unknown.
 
     It is sent from the order's beginning on: the page keeps it if this server restarts before the
     end. It is empty if it equals the order of the Start button.

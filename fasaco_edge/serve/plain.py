@@ -8,30 +8,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from fasaco_edge.states import row_of
 from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport
 from fasaco_edge.wire.documents.status import Status
 
-WORDS = {
-    "idle": "ready",
-    "waiting for map": "starting",
-    "waiting for pose": "starting",
-    "loading": "starting",
-    "covering": "sweeping",
-    "returning": "driving home",
-    "blocked": "waiting",
-    "degraded": "needs help",
-}
-"""One word for each state whose own name is not plain."""
-DOES = {
-    "idle": "Ready to sweep",
-    "no map": "Ready, but has no map of the rooms yet",
-    "waiting for map": "Waits for its map of the rooms",
-    "waiting for pose": "Finds out where it is",
-    "loading": "Starts up",
-    "planning": "Plans its way",
-    "done": "Done",
-    "blocked": "Cannot go on just now",
-}
+NO_MAP = "Ready, but has no map of the rooms yet"
 STUCK = "Something blocks its way: open doors and clear the floor. It tries again by itself."
 UNKNOWN_ROOM = (
     "It knows no room of that name yet. Tap the room on the map and name it, or end the work."
@@ -85,7 +66,7 @@ ENDED = "left when the work was ended"
 # Reason of the mission if poses come too seldom, and its words for the owner.
 FAR_APART = "poses are too far apart"
 SELDOM = "it may have missed that: its place was not known often enough"
-# Share of the reachable floor above which unswept floor has this reason.
+# Share of the reachable floor above which unswept floor may have this reason.
 MUCH = 0.1
 PASSED, BESIDE = 8, 16
 MARKS = {
@@ -101,7 +82,7 @@ MARKS = {
 """The mark of each reason for unswept floor, see ``serve.messages.UNSWEPT_MARKS``."""
 REST = 64
 """The mark of other unswept floor, which is part of no order any more."""
-# Reasons of unreached cells that are no free floor, so that figures of floor lack them.
+# Reasons of unreached cells without free floor, which figures of floor leave out.
 NO_FLOOR = ("no longer free on the map", "unknown to the map")
 # Least area that is listed [m2].
 LEAST_M2 = 0.05
@@ -109,14 +90,19 @@ LEAST_M2 = 0.05
 NEAR_M = 0.5
 
 
+def word(state: str) -> str:
+    """Return one word for a state."""
+    return row_of(state).word or state
+
+
 def does(status: Status) -> str:
     """Return what the robot does now, in the owner's words."""
     mission, path = status.mission, status.path
     if status.state == "blocked" and mission.waits_for_room:
         return f"Waits for {mission.waits_for_room}"
-    state = "no map" if status.state == "idle" and status.map is None else status.state
-    if state in DOES:
-        return DOES[state]
+    has_no_map = status.state == "idle" and status.map is None
+    if words := NO_MAP if has_no_map else row_of(status.state).does:
+        return words
     if status.state == "paused":
         return "Paused at home" if _is_home(status) else "Paused: waits for Resume"
     if status.state == "charging":
@@ -126,6 +112,14 @@ def does(status: Status) -> str:
         is_to_charge = status.battery is not None and status.battery.goes_on_at is not None
         return "Drives to its dock to charge" if is_to_charge else "Drives home"
     return _sweeps(status) if path is None or path.steps else "Waits a moment"
+
+
+def look(status: Status) -> str:
+    """Return the class of the state in the page's style sheet: bad, wait, go or ""."""
+    row = row_of(status.state)
+    if status.troubles or row.needs_help:
+        return "bad"
+    return {"grey": "", "amber": "wait"}.get(row.colour, "go")
 
 
 def last_seen(status: Status) -> str:
@@ -177,8 +171,8 @@ class LeftFloor:
 def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
     """Return the unswept floor of an order, the largest part first.
 
-    ``ordered``: the newest status with an order, which may be over by now; None if no such status
-    has come: how much an order left that was cancelled before is not known then.
+    ``ordered``: the newest status with an order, which may be over by now; None before the first:
+    then it is unknown how much a cancelled order left.
     """
     is_ended, found = status.mission.ordered is None, dict[str, LeftFloor]()
     if is_ended and not (status.floor and status.floor.swept_m2):
@@ -200,7 +194,7 @@ def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
         reason = _why_closed(of) if part.reason == CLOSED else LEFT.get(part.reason, OTHERWISE)
         _add(found, reason, part.m2, MARKS.get(part.reason, 0))
     for area in mission.unreached.areas:
-        # If the status has figures of floor, only cells outside of them count: none counts twice.
+        # If the status has figures of floor, only areas that these leave out count.
         if floor.left is None or area.reason in NO_FLOOR:
             is_tried = area.reason.startswith(TRIED)
             reason = NOT_REACHED if is_tried else LEFT.get(area.reason, OTHERWISE)

@@ -49,7 +49,7 @@ class RecordedView(ServedView):
         self._drawn: dict[str, DrawingPlace] = {}
 
     def silent_s(self, now: float) -> float:
-        """Return the age of the newest status [s]; 0 if the next one is not yet overdue."""
+        """Return the age of the newest status [s]; 0 if the next status is not yet overdue."""
         silent = super().silent_s(now)
         return silent if silent > entities.STATUS_PERIOD_S + SILENCE_S else 0.0
 
@@ -126,7 +126,7 @@ class Playback:
         return []
 
     def at(self, at_s: float) -> list[str | bytes]:
-        """Return the messages that changed from the time shown before to ``at_s``.
+        """Return the messages that differ between the time shown so far and ``at_s``.
 
         ``at_s``: the robot's time since the recording began [s].
 
@@ -149,7 +149,7 @@ class Playback:
             self._path, since_ns = path, path.at_ns
             line = timeline.line(path)
             view.follow(line, self._abouts.get(line.revision, b""), now)
-            # Making its message sets the path along which later poses move the robot.
+            # Making the path's message sets the path along which later poses move the robot.
             found = view.news(now)
         poses = timeline.poses_between(since_ns, at_ns)
         view.drive(poses[:: -(-len(poses) // MOST_POSES) or 1], now)

@@ -157,7 +157,7 @@ class ServedView(RobotState):
         self._grids[kind] = read_grid(sample.payload)
 
     def _read_map_update(self, sample: Sample, _: float) -> None:
-        # An update without its map is of no use: the map came before this process started.
+        # An update is of no use without its map, which came before this process started.
         if "map" in self._grids:
             self._grids["map"] = with_update(self._grids["map"], sample.payload)
 

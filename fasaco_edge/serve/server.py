@@ -233,11 +233,9 @@ class LiveServer(Server):
         self._newest: dict[str, tuple[int, str | bytes]] = {}
 
     def newest(self) -> list[tuple[str, int, str | bytes]]:
-        """Return kind, number and content of the newest messages."""
         return [(kind, number, message) for kind, (number, message) in self._newest.items()]
 
     def ask(self, query: str, payload: bytes, timeout_s: float) -> list[QueryReply]:
-        """Ask the daemon; blocks."""
         return self._feed.ask(query, payload, timeout_s)
 
     def at(self, _: float) -> list[str | bytes]:

@@ -54,7 +54,7 @@ class Mapper:
         return pose
 
     def true_place(self, x: float, y: float) -> Point:
-        """Return the true position of a point of its map [m]: the same point."""
+        """Return the true position of a point of the robot's map [m]: the same point."""
         return x, y
 
     def scan(self, pose: Pose2D) -> Window | None:

@@ -103,13 +103,13 @@ def run_simulation(
         speed: simulated seconds per second, above 0; a computer that cannot keep up runs slower.
         driver: "ideal": it follows paths itself; "follow": velocities drive it.
         meets_others: whether other robots on the bus are obstacles.
-        waits: whether it waits until a process listens at its endpoint.
+        waits: whether the robot waits until a process listens at the endpoint.
         should_stop: called some fifty times a second.
         report: called about twice a second, and at the end.
 
     Raises:
         BadConfiguration: ``speed`` is not above 0.
-        BusUnavailable: the bus cannot be joined, and it does not wait.
+        BusUnavailable: the bus cannot be joined, and ``waits`` is False.
     """
     if not speed > 0.0:
         raise BadConfiguration(f"speed must be above 0, got {speed}")

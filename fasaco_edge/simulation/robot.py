@@ -1,4 +1,4 @@
-"""Simulated robot: a differential drive that follows a polyline, and changes to new ones.
+"""Simulated robot: a differential drive that follows a polyline, and changes to new polylines.
 
 It drives straight and turns on the spot. The drive is ideal (no slip, no delay), so that a run
 shows effects of the path alone. It comes to rest at every corner: that is the cost of turns.
@@ -228,9 +228,10 @@ def corners_to_end(
 ) -> NDArray[np.float64] | None:
     """Return the corners to drive through from the track's last point to the path's end.
 
-    The way leads straight to the first waypoint not yet driven through, or to the one before it. If
-    neither is clear, a robot that ``goes_back`` first drives back along its track until one of them
-    is. If none ever is, it drives straight to the nearest clear waypoint of the first metres.
+    The way leads straight to the first waypoint not yet driven through, or to the waypoint before
+    it. If neither way is clear, a robot that ``goes_back`` first drives back along its track until
+    one is. If none becomes clear, it drives straight to the nearest clear waypoint of the first
+    metres.
 
     Args:
         path: waypoints [m], float64 (n, 2).

@@ -122,7 +122,7 @@ class World:
         self.distance_m = 0.0
         self.collisions = 0
         self.stops = 0
-        # Positions of other robots [m], by name; numbers of touches, and of stops before one.
+        # Positions of other robots [m], by name; numbers of touches, and of stops before a robot.
         self.others: dict[str, Point] = {}
         self.touches = self.meetings = 0
         self._is_held = False
@@ -160,7 +160,7 @@ class World:
     def follow(self, path: NDArray[np.float64]) -> None:
         """Drive along ``path``, waypoints (x, y) [m], float64 (n, 2); stop if it is empty.
 
-        It replaces the last path. The robot must have scanned, in its first tick, to find a way.
+        It replaces the last path. The robot finds a way only after the scan in its first tick.
         """
         self._path, self._stopped_at = path, self.stops
         self._join()
@@ -199,7 +199,7 @@ class World:
         )
 
     def _is_due(self, rate_hz: float) -> bool:
-        """Return whether a tick at a rate is due now, as it is in the first tick."""
+        """Return whether an event of a rate is due in this tick; all are due in the first tick."""
         return (self._ticks - 1) % self.config.period_ticks(rate_hz) == 0
 
     def _drain(self) -> None:

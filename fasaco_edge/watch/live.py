@@ -68,8 +68,8 @@ class Watched(ABC):
         """Return the state in a line."""
 
     @abstractmethod
-    def page(self, now: float, width: int, height: int) -> list[str]:
-        """Return a page of lines."""
+    def page(self, now: float, width: int, height: int, *keys: str) -> list[str]:
+        """Return a page of lines; ``keys``: hints for its headline."""
 
     @abstractmethod
     def is_known(self) -> bool:
@@ -98,7 +98,7 @@ def watch_on_screen(
             key = (int(now), screen.size(), watched.view.trouble)
             if came or key != shown_at:
                 shown_at, size = key, key[1]
-                screen.show(watched.page(now, *size), size)
+                screen.show(watched.page(now, *size, "q quits"), size)
             if "q" in screen.keys(FRAME_S).lower():
                 return True
     return False

@@ -11,8 +11,9 @@ from rich.text import Text
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client import phrases
 from fasaco_edge.client.feed import Feed
-from fasaco_edge.client.phrases import TROUBLED, age, clock
+from fasaco_edge.client.phrases import age, clock
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.states import TROUBLED
 from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.glyphs import FAINT, ScreenBlocks, with_keys
@@ -65,16 +66,17 @@ class Page:
         self._blocks = ScreenBlocks(console)
         self._picture = MissionPicture()
 
-    def lines(self, view: RobotView, now: float, width: int, height: int) -> list[str]:
+    def lines(self, view: RobotView, now: float, width: int, height: int, *keys: str) -> list[str]:
         """Return ``height`` lines, each ``width`` characters wide.
 
         Args:
             view: what to show.
             now: time since the epoch [s].
             width, height: size of the screen, each at least 1 [characters].
+            keys: hints for the headline, if they fit.
         """
         layout = Layout.of(width, height)
-        page = self._blocks.block(headline(view, now, width), width, 1)
+        page = self._blocks.block(headline(view, now, width, *keys), width, 1)
         if layout.lines:
             page += self._middle(view, time_to_go(view, now), layout)
             whole = self._picture.path_is_whole
@@ -129,7 +131,7 @@ def time_to_go(view: RobotView, now: float) -> str:
     return f"at least {words}" if words and view.grows(now) else words
 
 
-def headline(view: RobotView, now: float, width: int) -> Text:
+def headline(view: RobotView, now: float, width: int, *keys: str) -> Text:
     """Return a line that sums up the state, for a width [characters]."""
     line = Text().append(f" {view.robot} ", "bold reverse").append("  ")
     status, silent = view.status, view.silent_s(now)
@@ -159,7 +161,7 @@ def headline(view: RobotView, now: float, width: int) -> Text:
         # The robot moves this much faster on the screen; the time to go is in real seconds.
         scale = view.settings.robot.time_scale
         line.append(f"  {scale:g} x real time" if scale != 1.0 else "", "dim")
-    return with_keys(line, width, "q quits", clock(now))
+    return with_keys(line, width, *keys, clock(now))
 
 
 class RobotWatch(Watched):
@@ -211,8 +213,8 @@ class RobotWatch(Watched):
             return "the daemon is silent"
         return phrases.figures(status)
 
-    def page(self, now: float, width: int, height: int) -> list[str]:
-        return self._page.lines(self.view, now, width, height)
+    def page(self, now: float, width: int, height: int, *keys: str) -> list[str]:
+        return self._page.lines(self.view, now, width, height, *keys)
 
     def is_known(self) -> bool:
         """Return whether a status of the robot's daemon has arrived."""

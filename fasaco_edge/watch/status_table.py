@@ -6,6 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.client import phrases
+from fasaco_edge.states import row_of
 from fasaco_edge.text import duration, one_line, percent
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.documents.path_documents import PathReport
@@ -15,17 +16,8 @@ from fasaco_edge.wire.documents.status import BatteryReport, FleetReport, Status
 from fasaco_edge.wire.reasons import plain
 
 Row = tuple[str, Text]
-# Colour of a state.
-STATE_COLOURS = {
-    "planning": "magenta",
-    "covering": "green",
-    "returning": "green",
-    "charging": "cyan",
-    "paused": "yellow",
-    "blocked": "red",
-    "degraded": "yellow",
-    "done": "blue",
-}
+# Rich's names of the colours of states that it names otherwise.
+SHADES = {"grey": "bright_black", "violet": "magenta", "amber": "yellow"}
 LONGEST_BAR = 40
 LABEL_WIDTH = 9
 # Largest number of rooms shown.
@@ -75,8 +67,8 @@ def _rows(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet
 
 
 def state_colour(state: str) -> str:
-    """Return the colour of a state."""
-    return STATE_COLOURS.get(state, "bright_black")
+    colour = row_of(state).colour
+    return SHADES.get(colour, colour)
 
 
 def _floor(floor: FloorReport) -> list[Row]:

@@ -13,7 +13,7 @@ WORDS = {
 }
 # The recorder's word for a daemon that sends nothing.
 SILENT = "the planner is silent"
-# Part of a mission's ending, left out: where the swept floor is shown, ``possible`` adds it.
+# Part of the text at a mission's end, left out here: ``possible`` adds it to the swept floor.
 _POSSIBLE = re.compile(r", or of [\d.]+ m2 if walls are a pixel thinner than on the map")
 
 

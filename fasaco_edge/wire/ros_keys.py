@@ -11,7 +11,7 @@ send a type hash.
 An action is three services and two topics below ``<action>/_action``, also for rmw_zenoh and
 zenoh-bridge-ros2dds. Sources: rcl_action of Jazzy (names),
 rmw_zenoh_cpp at commit 028bbe3 (``rmw_service_data.cpp``: attachment of a request; sequence numbers
-must not repeat), nav2_msgs of Humble, Iron, Jazzy and Lyrical. Hashes follow REP 2016; that of
+must not repeat), nav2_msgs of Humble, Iron, Jazzy and Lyrical. Hashes follow REP 2016; the hash of
 CancelGoal is also published.
 """
 

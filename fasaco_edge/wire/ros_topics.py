@@ -17,7 +17,7 @@ class RosRow(NamedTuple):
     Attributes:
         name: its key under ``ros2.topics`` of the configuration.
         topic: its name in the daemon and in recordings.
-        direction: as seen by the planner.
+        direction: as seen by the daemon.
         schemas: allowed message types.
         latched: transient local.
         depth: history depth.

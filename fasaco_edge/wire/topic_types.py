@@ -55,7 +55,7 @@ VOLATILE = Qos()
 class Queues(NamedTuple):
     """Queue lengths of a topic at each receiver of this package.
 
-    NEWEST: a newer sample replaces the previous one; the recorder drops samples so only when it is
+    NEWEST: a newer sample replaces an older one; the recorder drops samples only when it is
     behind. EVERY: limited only by the receiver's memory. None: that receiver does not subscribe.
     """
 
@@ -73,7 +73,7 @@ class Topic:
 
     Attributes:
         name: name of the row, and of the topic in recordings.
-        direction: as seen by the planner.
+        direction: as seen by the daemon.
         when: the event that makes a sample.
         speaker: the role that publishes it.
         listeners: roles that may subscribe to it; ``bus.access`` says which include others.

@@ -114,7 +114,7 @@ PATH = Topic(
     schemas=(schemas.PATH,),
     attachment="path_attachment.json",
     qos=Qos(
-        "interactive_high", express=True, cache=1, why="a frozen receiver never blocks the planner"
+        "interactive_high", express=True, cache=1, why="a frozen receiver never blocks the daemon"
     ),
     queues=Queues(recorder=EVERY, watch=64),
     limits=("max_path_poses", "max_coordinate_m"),
@@ -233,7 +233,7 @@ FLEET = Topic(
     # Robots share an area by these messages: each subscribes to the keys of the others.
     listeners=("fleet", "viewer"),
     json="fleet.json",
-    qos=Qos("data_low", why="the next one repeats all of it, within a second"),
+    qos=Qos("data_low", why="the next message repeats all of it, within a second"),
     rate_hz=1.0,
     queues=Queues(daemon=64),
     limits=(
@@ -244,7 +244,7 @@ FLEET = Topic(
 ALIVE = Topic(
     name="alive",
     direction="liveliness token",
-    when="exists while the planner is able to plan",
+    when="exists while the daemon is able to plan",
     speaker="robot",
     listeners=("viewer",),
 )

@@ -15,6 +15,7 @@ from fasaco_edge.bench.benchmark import Benchmark
 from fasaco_edge.cli import run_command
 from fasaco_edge.cli.bench import EPILOG, add_benchmarks
 from fasaco_edge.cli.console.parser import Parser
+from tests.benchmarks.ants.benchmark import ANTS
 from tests.benchmarks.fleets.benchmark import FLEET_ONLINE
 from tests.benchmarks.floor import FLOOR
 from tests.benchmarks.full import FULL
@@ -29,14 +30,15 @@ from tests.benchmarks.table1.benchmark import TABLE1
 from tests.benchmarks.turns.benchmark import TURNS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET_ONLINE, ONLINE, ROOMS, ROOM_IDS,
-    BY_ROOM,
+    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, ANTS, FLEET_ONLINE, ONLINE, ROOMS,
+    ROOM_IDS, BY_ROOM,
 )  # fmt: skip
 # What each takes with its defaults, on two cores; the short form of each is a test.
 TAKES = {
     "table1": "half an hour", "quality": "2 minutes", "turns": "a minute", "floor": "minutes",
-    "peers": "half an hour", "replan": "minutes", "full": "minutes", "fleet-online": "half an hour",
-    "online": "half an hour", "rooms": "a minute", "room-ids": "minutes", "by-room": "half an hour",
+    "peers": "half an hour", "replan": "minutes", "full": "minutes", "ants": "minutes",
+    "fleet-online": "half an hour", "online": "half an hour", "rooms": "a minute",
+    "room-ids": "minutes", "by-room": "half an hour",
 }  # fmt: skip
 
 

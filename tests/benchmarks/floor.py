@@ -124,13 +124,14 @@ def drive(building: str, truth: OccupancyGrid, start: tuple[float, float], case:
     from fasaco_edge.kernels.floor.turning import proportional_turning
     from fasaco_edge.mission.config import Sweeping
     from fasaco_edge.mission.core.mission import Mission, MissionConfig
-    from fasaco_edge.mission.events import MapReceived, PlanReady, PoseReceived, State
+    from fasaco_edge.mission.events import MapReceived, PlanReady, PoseReceived
     from fasaco_edge.planners.cost import CoverageCost, SearchWork
     from fasaco_edge.planners.line import LINES
     from fasaco_edge.planners.planner import WorkLimit
     from fasaco_edge.planners.search.near_optimal import NearOptimal
     from fasaco_edge.simulation.robot import SimulationConfig
     from fasaco_edge.simulation.world import World
+    from fasaco_edge.states import State
 
     simulated = SimulationConfig(speed_m_s=SPEED_M_S, robot_radius_m=RADIUS_M, padding_m=0.01)
     world = World(truth, Pose2D(*start), simulated)

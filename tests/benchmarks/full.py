@@ -28,7 +28,7 @@ from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.grids import read_grid
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.problem import CoverageProblem
-from tests.benchmarks.harness import WrongWalkError, check_names, grid_name, planner_for
+from tests.benchmarks.harness import check_covered, check_names, grid_name, planner_for
 
 DEFAULT_MAPS = ("flat", "office", "walled_grid", "basement", "warehouse")
 STEP_S, QUARTER_TURN_S = 1.2, 1.5
@@ -111,7 +111,7 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Pair, None, None]:
                 anew = planner.plan(problem, limit)
                 posed = replace(problem, before=before, is_full=True)
                 path = planner.plan(posed, limit)
-                _check(posed, path.cells)
+                check_covered(posed, path.cells)
                 yield Pair(
                     grid=grid_name(name),
                     situation=situation.name,
@@ -145,14 +145,6 @@ def _situations(
     half[:, : len(covered.T) // 2] = False
     if (lattice.coverable & ~half).any():
         yield Situation(SITUATIONS[3], lattice, (row, col), half)
-
-
-def _check(problem: CoverageProblem, cells: NDArray[np.int32]) -> None:
-    """Raise WrongWalkError where a walk leaves a cell out."""
-    left = problem.to_cover.copy()
-    left[tuple(cells.T)] = False
-    if left.any():
-        raise WrongWalkError(f"{np.count_nonzero(left)} cells are left out")
 
 
 def _beside(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.benchmarks.judge import WalkVerdict, check_walk
@@ -64,6 +68,25 @@ def judged(problem: CoverageProblem, path: CoveragePath) -> WalkVerdict:
             f"{path.planner}, seed {path.seed}, from {problem.start}: {'; '.join(wrong)}"
         )
     return verdict
+
+
+def check_covered(problem: CoverageProblem, cells: NDArray[np.int32]) -> None:
+    """Raise WrongWalkError where a walk, int32 (n, 2), leaves a cell out."""
+    left, window = problem.to_cover.copy(), problem.lattice.window
+    left[tuple((cells - (window.row0, window.col0)).T)] = False
+    if left.any():
+        raise WrongWalkError(f"{np.count_nonzero(left)} cells are left out")
+
+
+@dataclass(slots=True)
+class ProcessorBudget:
+    """Stop after some seconds of this thread's processor time."""
+
+    seconds: float
+    began: float = field(default_factory=time.thread_time)
+
+    def __call__(self, progress: SearchProgress) -> bool:
+        return time.thread_time() - self.began >= self.seconds
 
 
 def within(low: Number, high: Number) -> Callable[[str], Number]:

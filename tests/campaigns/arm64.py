@@ -22,7 +22,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.deploy.emulated import Tree, make_release, why_not
+from tests.campaigns.emulated import Tree, make_release, why_not
 from tests.deploy.installed import CHECKOUT
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from fasaco_edge.host.processes import own_mb
-from tests.support.map_mutations import mutant
+from tests.campaigns.map_mutations import mutant
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms

@@ -62,7 +62,7 @@ STRIDE = 3
 # What says, on standard error, that something was wrong.
 TELLS = ("WARNING", "ERROR", "fasaco-edge:", "kernels not ready")
 # What is said where no call fails: after a reset, and where the computer is busy with much else.
-USUAL = ("the ledger before is kept as robot.ledger.reset-", "recorder did not end in ")
+USUAL = ("the previous ledger is kept as robot.ledger.reset-", "recorder did not end in ")
 
 
 @dataclass(frozen=True)

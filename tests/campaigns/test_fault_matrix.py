@@ -1,4 +1,4 @@
-"""The fault matrix's short form: three of its combinations, on a machine that may be busy."""
+"""The fault matrix's short form: two of its combinations, on a machine that may be busy."""
 
 from __future__ import annotations
 
@@ -20,10 +20,3 @@ def test_the_end_of_a_second_follower_leaves_the_robot_driving():
     cell = run_cell(Cell((("second follower", "killed"),), DRIVES), WATCH_S)
     assert cell.longest_gap_s <= BUSY_S
     assert cell.together == 0
-
-
-def test_a_second_follower_goes_on_where_the_first_was_killed():
-    cell = run_cell(Cell((("follower", "killed"),), STOPS), WATCH_S)
-    assert cell.last_s is None or cell.last_s <= LIMIT_S
-    assert cell.successor_s is not None
-    assert cell.together <= 1

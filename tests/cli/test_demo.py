@@ -6,6 +6,7 @@ import argparse
 import json
 import math
 import re
+import time
 from itertools import pairwise
 from pathlib import Path
 
@@ -34,7 +35,10 @@ from tests.support.rooms import (
     fill,
     room,
 )
+from tests.support.terminal import Terminal
 
+# From the end of set-up to the first picture on a quiet machine [s].
+FIRST_PICTURE_S = 10.0
 # Corner of the map, and of a cell.
 CORNER = Pose2D(-0.9, -0.3)
 
@@ -78,15 +82,44 @@ def test_the_robot_starts_once_its_recorder_listens(tmp_path, monkeypatch):
     assert order == ["daemon", "follower", *["asked"] * 3, "robot"]
 
 
-def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
+def test_a_demo_is_a_live_map_and_then_a_summary(tmp_path, monkeypatch, building):
     pytest.importorskip("rerun")
-    out = tmp_path / "demo"
-    options = ("--map", building, "--speed", 60, "--timeout", 1200)
-    ended = fasaco_edge("demo", *options, "--out", out, "--json")
-    assert ended.code == 0, ended.err
-    summary = json.loads(ended.out)
-    print(summary)
-    assert summary == json.loads((out / "summary.json").read_text())
+    monkeypatch.chdir(tmp_path)
+    words = ("demo", "--map", building, "--speed", 30, "--timeout", 1200, "--out", "demo")
+    with Terminal(*words, DISPLAY=":0") as shell:
+        shell.wait_text("kernels ready")
+        began = time.monotonic()
+        page = shell.wait_text("q quits")
+        assert time.monotonic() - began < FIRST_PICTURE_S * slowness()
+        assert page.count("\n") == 23
+        shell.wait(
+            lambda seen: (
+                re.search(r" COVERING .* path \d+, (at least )?\S+ \w+ to go  30 x real", seen)
+                and re.search(r"to go +(at least )?\S+ \w+, \d+ steps", seen)
+                and all(sign in seen for sign in ("swept", "█", "▀"))
+            )
+        )
+        for columns, lines in ((30, 6), (100, 30)):
+            shell.resize(columns, lines)
+            shell.wait(lambda seen, lines=lines: seen.count("\n") == lines - 1)
+        assert shell.end() == 0, shell.written[-2000:]
+        assert shell.is_clean()
+        screen = "\n".join(shell.screen())
+    assert screen.startswith("kernels ready")
+    assert "q quits" not in screen
+    assert "\nthe mission is over: " in screen
+    assert "\nrooms: every reachable cell is covered\n" in screen
+    assert re.search(r"floor swept +│ \d\.\d of \d\.\d m2", screen)
+    for program in ("fasaco-edge review", "fasaco-edge serve", "rerun"):
+        assert f"{program} demo/*.rrd\n" in screen
+    # Its length is that of where this is installed.
+    assert all(line.startswith("in another terminal: ") for line in shell.shown.wrapped)
+    check_demo(tmp_path / "demo", building)
+
+
+def check_demo(out, building):
+    """Check what a demo has left behind against its building."""
+    summary = json.loads((out / "summary.json").read_text())
     assert summary["complete"] is True
     assert summary["errors"] == 0
     assert summary["plans"] >= 1
@@ -108,7 +141,7 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
     review = read_review([recording])
     assert math.dist(review.data.track[0, :2], trail[0]) < 0.01
     # Its times are those of the robot, whose straight lines take it at 0.25 m/s.
-    assert review.data.time_scale == 60
+    assert review.data.time_scale == 30
     ways, steps_s = np.diff(review.data.track[:, :2], axis=0), np.diff(review.data.times)
     moves = steps_s > 0
     assert (np.hypot(*ways[moves].T) / steps_s[moves]).max() == pytest.approx(0.25, abs=0.01)
@@ -125,12 +158,15 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
     assert not [pid for pid in processes_of(out) if is_running(pid)]
 
 
-def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
+def test_robots_of_a_fleet_cover_a_building_together(tmp_path):
     pytest.importorskip("rerun")
     out = tmp_path / "demo"
     # Robots too fast for a busy machine outrun the paths of their daemons.
     speed = round(max(6.0 / slowness(), 3.0), 1)
-    options = ("--map", building, "--robots", 2, "--speed", speed, "--timeout", 1200)
+    hall = tmp_path / "hall.yaml"
+    pixels = fill(room(3.3, 1.8), 1.6, 1.2, 1.7, 1.8, WALL)
+    write_map(OccupancyGrid(GridGeometry(*pixels.shape, RESOLUTION_M, CORNER), pixels), hall)
+    options = ("--map", hall, "--robots", 2, "--speed", speed, "--timeout", 1200)
     ended = fasaco_edge("demo", *options, "--out", out, "--json")
     assert ended.code == 0, ended.err
     assert "fasaco-edge watch --fleet demo --connect tcp/127.0.0.1:" in ended.err
@@ -144,7 +180,7 @@ def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     starts = []
     for name in ("r1", "r2"):
         trail = np.loadtxt(out / name / "trail.csv", delimiter=",", skiprows=1)
-        check_clearance(read_map(building), trail)
+        check_clearance(read_map(hall), trail)
         starts.append(trail[0])
         assert any(file.startswith(f"{out}/{name}/") for file in summary["recording"])
     assert math.dist(*starts) > 2.0

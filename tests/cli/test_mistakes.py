@@ -39,6 +39,8 @@ def folder(tmp_path, monkeypatch):
     np.save("numbers.npy", np.ones((6, 6)))
     (tmp_path / "text.yaml").write_text("image: nowhere.pgm\n")
     (tmp_path / "text.npy").write_text("no grid")
+    (tmp_path / "order.yaml").write_text("zones: [{passes: 2}]")
+    (tmp_path / "order.json").write_text("{")
     (tmp_path / "mine.py").write_text("def f(problem): pass")
     Image.new("L", (60, 60), 255).save("map.png")
     (tmp_path / "map.yaml").write_text(MAP)
@@ -51,7 +53,7 @@ def folder(tmp_path, monkeypatch):
     ("words", "code", "said"),
     [
         ("plan nowhere.yaml", 1, "no map 'nowhere.yaml'"),
-        ("plan .", 1, "'.' is a folder\n  hint: give one of its maps: map.yaml, text.yaml"),
+        ("plan .", 1, "'.' is a folder\n  hint: give one of its maps: map.yaml, order.yaml"),
         ("plan flatt", 1, "hint: did you mean flat?"),
         ("plan ./maps.yaml", 1, "hint: did you mean map.yaml?"),
         ("plan map.yml", 1, "hint: did you mean map.yaml?"),
@@ -62,20 +64,13 @@ def folder(tmp_path, monkeypatch):
         ("plan blocked.npy --start 2,2", 1, "start cell (2, 2) is blocked"),
         ("plan good.npy --start 6,0", 1, "start cell (6, 0) lies outside rows 0..5"),
         ("plan good.npy --start-xy 99,0", 1, "lies outside"),
-        ("plan good.npy --end 6,0", 1, "end cell (6, 0) lies outside rows 0..5"),
         ("plan blocked.npy --end 2,2", 1, "end cell (2, 2) is blocked"),
         ("plan halves.npy --end 5,5", 1, "no walk leads from start cell (0, 0) to end cell (5, 5)"),
         ("plan good.npy --speed-m-s 0", 78, "--speed-m-s: expected a number above 0, got 0.0"),
-        ("plan good.npy --turn-s -1", 78, "--turn-s: expected a number of at least 0, got -1.0"),
         ("plan good.npy --cell 1e-5", 78, "cell_m / speed_m_s: must be in [0.001, 3600] s"),
         ("plan good.npy --budget 0", 78, "budget must be finite and above 0 s, got 0.0"),
         ("plan office --cell 0.0001", 1, "exceeds 4000000 cells"),
         ("plan office --cell 0", 78, "--cell: expected a number above 0, got 0.0"),
-        (
-            "plan office --robot-radius -1",
-            78,
-            "--robot-radius: expected a number above 0, got -1.0",
-        ),
         ("plan good.npy --ants 0", 78, "ants: must be in 8..1000000"),
         ("plan good.npy --ants 7", 78, "one for each cohort at least, got 7"),
         ("plan good.npy --velocities 8:x", 78, "velocities: must look like 8:1, 1:8, 4 or 8,4,1"),
@@ -131,7 +126,24 @@ def folder(tmp_path, monkeypatch):
         ("follow --speed 0", 78, "--speed must be above 0 and at most 100, got 0"),
         ("demo --speed 0 --out o", 78, "--speed must be above 0, got 0.0"),
         ("demo --out good.npy", 78, "cannot write good.npy: File exists"),
+        ("plan office --passes cross", 78, "--passes[0]: cross goes after a pass with lanes"),
+        ("plan office --passes auto@2", 78, "at 2 m/s is faster than the robot, 0.25 m/s"),
+        ("plan office --passes auto --planner fasaco", 78, "only colony-search has passes"),
+        ("plan office --passes auto --pheromone-png p.png", 78, "has a trail of its own"),
+        ("plan office --passes 30deg --line cells", 78, "the centres of cells lie along the axes"),
+        ("plan office --passes auto --turn-radius 0.3", 78, "a robot that turns on the spot"),
         ("run --config nowhere.yaml", 78, "nowhere.yaml: No such file or directory"),
+        ("follow --config nowhere.yaml", 78, "nowhere.yaml: No such file or directory"),
+        ("follow --robot a/b", 78, "must be chunks of letters"),
+        ("mission start --order missing.yaml", 1, "missing.yaml: No such file or directory"),
+        ("mission start --order order.yaml", 1, "order.yaml, line 1: zones[0].name: missing"),
+        ("mission start --order order.json", 1, "order.json: not plain JSON"),
+        ("mission start --order order.yaml --passes 2", 1, "--order must be the only option for"),
+        ("mission start --passes 0", 1, "passes: expected a whole number of at least 1, got 0"),
+        ("mission start --zone a:0,0;1,1;1,0;0,1", 1, "[0].polygon: crosses or touches itself"),
+        ("mission start --zone a:0,0;1,0;nan,1", 1, "zones[0].polygon[2]: must be finite"),
+        (f"mission status --connect {NOBODY}", 1, f"cannot connect to {NOBODY}\n"),
+        ("mission keep-out add --name a 0,0;1,1;1,0;0,1", 1, "polygon: crosses or touches itself"),
     ],
 )
 def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said):
@@ -183,6 +195,21 @@ def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said)
         ("plan office --planner a-lab:Deep", "FILE.py:NAME or MODULE:NAME, got 'a-lab:Deep'"),
         ("record", "the following arguments are required: --out"),
         ("maps --log-level loud", "argument --log-level: invalid choice: 'loud'"),
+        ("mission start --zone 0,0;1,0;1,1", "must be NAME or NAME:x,y;x,y;..., got"),
+        ("mission start --zone a:0,0;1,0", "must be x,y;x,y;x,y;... in metres, got '0,0;1,0'"),
+        ("mission start --keep-out -1,0;1;1,1", "must be x,y;x,y;x,y;... in metres, got"),
+        ("mission status --timeout 0", "must be in (0, 3600] s, got '0'"),
+        ("mission pause --passes 2", "unrecognized arguments"),
+        ("mission keep-out", "a command is missing; there are add, remove, list"),
+        ("mission keep-out add 1,1;2,1;2,2", "the following arguments are required: --name"),
+        ("mission keep-out add --name a -1,1 2,1", "must be x,y;x,y;x,y;... in metres, got '-1,1"),
+        ("mission keep-out remove", "the following arguments are required: NAME"),
+        ("follow --pose-age nan", "must be in (0.05, 10] s"),
+        ("replay a.rrd --work -1", "whole number from 0 on, got '-1'"),
+        ("plan office --passes edge,corner", "got 'corner'"),
+        ("plan office --align=wall", "must be walls, axes or an angle"),
+        ("plan office --align=nan", "must be walls, axes or an angle"),
+        ("plan office --align=361", "must be walls, axes or an angle"),
     ],
 )
 def test_an_unknown_word_is_named(folder, capsys, words, said):

@@ -244,14 +244,6 @@ def test_an_end_is_named_as_a_start_is(plan, tmp_path, capsys):
     assert "end cell (0, 30)" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("align", ["wall", "nan", "361", "1,2"])
-def test_cells_lie_along_walls_or_axes_or_at_an_angle(capsys, align):
-    with pytest.raises(SystemExit) as ended:
-        main(["plan", "office", "--line", "quick", f"--align={align}"])
-    assert ended.value.code == 2
-    assert "must be walls, axes or an angle" in capsys.readouterr().err
-
-
 def test_a_map_gets_a_floor_line_unless_a_paper_planner_runs(plan, grid_file):
     lines = {
         words: plan(*words)[0]["line"]
@@ -401,7 +393,6 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("--speed-m-s -1", "--speed-m-s: expected a number above 0, got -1.0"),
         ("--turn-s -1", "--turn-s: expected a number of at least 0, got -1.0"),
         *((f"--clearance={m}", "--clearance: expected a number") for m in ("1.1", "-0.1", "nan")),
         *((f"--overlap={m}", "--overlap: expected a number") for m in ("0.9", "-0.1", "nan")),

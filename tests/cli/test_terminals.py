@@ -1,4 +1,4 @@
-"""Each command in terminals of three kinds: nothing wraps, no escape is shown, Ctrl-C ends it."""
+"""Each command in terminals of two kinds: nothing wraps, no escape is shown, Ctrl-C ends it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.support.terminal import Terminal
 
 ROOT = Path(__file__).parents[2]
 # Columns, lines and environment.
-TERMINALS = [(80, 24, {}), (200, 50, {"NO_COLOR": "1"}), (60, 20, {"TERM": "dumb"})]
+TERMINALS = [(80, 24, {"NO_COLOR": "1"}), (60, 20, {"TERM": "dumb"})]
 COLOUR = re.compile(r"\x1b\[(?:\d+;)*(?:3[0-8]|4[0-8]|9[0-7])[;m]")
 
 

@@ -50,8 +50,11 @@ def said(**sections):
             "scan has no effect where ros2.follow is nav2",
         ),
         (
-            {"planner": {"line": "cells", "align": "axes"}, "robot": {"overlap": 0.2}},
-            "no effect where planner.line is cells: planner.align, robot.overlap",
+            {
+                "planner": {"line": "cells", "align": "axes", "swept": 0.99},
+                "robot": {"overlap": 0.2},
+            },
+            "no effect where planner.line is cells: planner.align, planner.swept, robot.overlap",
         ),
         (
             {"planner": {"line": "cells"}, "robot": {"clearance_m": 0.1}},

@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import signal
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -202,27 +201,6 @@ def test_reset_keeps_the_ledger_aside(tmp_path):
         assert outsider.ask_status()["ledger"]["restored_cells"] == 0
 
 
-def test_zones_of_the_configuration(tmp_path):
-    zones = [{"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0.3, 1.5]]}]
-    mission = {"autostart": False, "zones": zones, "keep_out": [[[2, 2], [2.4, 2], [2.4, 2.4]]]}
-    with (
-        daemon_process(tmp_path, mission=mission) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        # By name also before there is a map; the command is published as it came.
-        commands = outsider.listen("command")
-        told(running, "start", "--zone", "kitchen")
-        heard = commands.wait(lambda heard: True)
-        assert json.loads(heard.payload)["order"]["zones"] == [{"name": "kitchen"}]
-        begin_idle(outsider)
-        report = outsider.wait_status(lambda status: status["state"] == "covering")["mission"]
-        assert [zone["name"] for zone in report["zones"]] == ["kitchen"]
-        assert report["keep_out"] == 1
-        refused = fasaco_edge("mission", "start", "--zone", "hall", "--connect", running.endpoint)
-        assert refused.code == 1
-        assert "no zone 'hall' in mission.zones" in refused.err
-
-
 def test_the_command_line(tmp_path):
     with (
         daemon_process(tmp_path, mission={"autostart": False}) as running,
@@ -272,50 +250,6 @@ def begin_idle(outsider: Outsider) -> None:
     outsider.put("map", map_bytes(room(6.0, 4.5)))
     outsider.put("pose", pose_bytes(0.45, 0.45))
     outsider.wait_status(lambda status: status["pose"] is not None)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("start", "--order", "missing.yaml"), "missing.yaml: No such file or directory"),
-        (("start", "--order", "order.yaml"), "order.yaml, line 1: zones[0].name: missing"),
-        (("start", "--order", "order.json"), "order.json: not plain JSON"),
-        (
-            ("start", "--order", "order.yaml", "--passes", "2"),
-            "--order must be the only option for the order, got --passe",
-        ),
-        (("start", "--passes", "0"), "passes: expected a whole number of at least 1, got 0"),
-        (("start", "--zone", "a:0,0;1,1;1,0;0,1"), "zones[0].polygon: crosses or touches itself"),
-        (("start", "--zone", "a:0,0;1,0;nan,1"), "zones[0].polygon[2]: must be finite"),
-        (("status",), "cannot connect to tcp/127.0.0.1:1\n"),
-    ],
-)
-def test_mistakes_are_reported_without_a_daemon(tmp_path: Path, monkeypatch, capsys, words, said):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "order.yaml").write_text("zones: [{passes: 2}]")
-    (tmp_path / "order.json").write_text("{")
-    assert main(["mission", *words, "--connect", "tcp/127.0.0.1:1"]) == 1
-    told = capsys.readouterr().err
-    assert said in told
-    assert "\n  hint: " in told
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ((), "a command is missing; there are start, pause,"),
-        (("dance",), "invalid choice: 'dance'"),
-        (("start", "--zone", "0,0;1,0;1,1"), "must be NAME or NAME:x,y;x,y;..., got"),
-        (("start", "--zone", "a:0,0;1,0"), "must be x,y;x,y;x,y;... in metres, got '0,0;1,0'"),
-        (("start", "--keep-out", "-1,0;1;1,1"), "must be x,y;x,y;x,y;... in metres, got"),
-        (("status", "--timeout", "0"), "must be in (0, 3600] s, got '0'"),
-        (("pause", "--passes", "2"), "unrecognized arguments"),
-    ],
-)
-def test_unknown_words_are_named(capsys, words, said):
-    with pytest.raises(SystemExit, match="2"):
-        main(["mission", *words])
-    assert said in capsys.readouterr().err
 
 
 def test_the_answer_says_what_is_special_about_a_pass(outsider, daemon):

@@ -7,8 +7,6 @@ import subprocess
 import sys
 from contextlib import ExitStack
 
-import pytest
-
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import cells_of, coverable_cells, map_bytes, pose_bytes, room
@@ -60,19 +58,6 @@ def test_from_the_first_status_to_the_last_each_is_one(tmp_path):
             check("mission.json", heard.json())
         told = [heard.json()["command"] for heard in commands.heard]
         assert told == ["start", "replan", "pause", "resume", "cancel"]
-
-
-def test_the_recorder_says_what_its_schema_has(tmp_path):
-    pytest.importorskip("rerun")
-    with (
-        daemon_process(tmp_path, "--record", str(tmp_path)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        recorder = outsider.listen("recorder")
-        check("recorder.json", recorder.wait(lambda heard: True).json())
-        outsider.wait_status(lambda status: (status["recorder"] or {}).get("state") == "recording")
-        for heard in outsider.status.heard:
-            check("status.json", heard.json())
 
 
 def test_the_example_s_map_outlives_a_daemon(tmp_path):

@@ -86,21 +86,6 @@ def test_a_killed_recorder_restarts_and_planning_continues(tmp_path):
     assert len(list(tmp_path.glob("*.rrd"))) >= 2
 
 
-def test_a_recorder_that_cannot_write_is_reported(tmp_path):
-    """A recorder that ends at once is tried again, ever more rarely."""
-    pytest.importorskip("rerun")
-    no_folder = tmp_path / "file"
-    no_folder.write_text("")
-    with (
-        daemon_process(tmp_path, "--record", str(no_folder)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        said = wait_recorder(outsider, "restarting")
-        assert said["reason"] == "exited with 78"
-        assert len(plan_times(outsider, 2, 0)) == 2
-        assert "cannot record into" in running.log_text()
-
-
 def test_a_slow_recorder_gets_time_to_start_but_a_hung_one_ends(tmp_path, monkeypatch):
     """On a slow computer its libraries alone take longer than a hang may last."""
     pytest.importorskip("rerun")

@@ -96,11 +96,3 @@ def test_a_second_robot_joins_where_one_listens(daemon, tmp_path):
     with Outsider(daemon.endpoint) as first_client:
         assert first_client.ask_status()["robot"] == "robot"
         assert daemon.process.poll() is None
-
-
-def test_an_invalid_endpoint_is_an_error_without_traceback(tmp_path):
-    with daemon_process(tmp_path, bus={"listen": ["tcp/127.0.0.1:notaport"]}) as running:
-        assert running.process.wait(120) != 0
-        assert "Traceback" not in running.log_text()
-        assert "fasaco-edge: " in running.log_text()
-        running.process.returncode = 0

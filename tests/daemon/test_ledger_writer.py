@@ -120,7 +120,7 @@ def test_each_new_beginning_keeps_what_there_was_until_then(tmp_path, caplog):
     writer.disk.close(1.0)
     aside = sorted(path.read_bytes() for path in tmp_path.glob("robot.ledger.mismatch-*"))
     assert aside == sorted(encode_ledger(lane(length)) for length in (3, 5))
-    assert caplog.text.count("the ledger before is kept as robot.ledger.mismatch-") == 2
+    assert caplog.text.count("the previous ledger is kept as robot.ledger.mismatch-") == 2
 
 
 def test_a_failing_disk_is_reported_once_and_retried(tmp_path, monkeypatch, caplog, retry_soon):

@@ -36,8 +36,7 @@ from fasaco_edge.wire.documents.status import (
     SupervisedRecorder,
 )
 from tests.deploy.manual import MANUAL
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process, free_endpoint
+from tests.support.processes import free_endpoint
 from tests.support.waiting import meanwhile, until
 
 STATUS = Status(
@@ -263,19 +262,3 @@ def test_others_may_read_if_the_address_is_open():
     assert MetricsConfig("localhost:1").address() == Address("127.0.0.1", 1)
     assert MetricsConfig("[::1]:1").address() == Address("::1", 1)
     assert MetricsConfig("0.0.0.0:1", open_to_everyone=True).address() == Address("0.0.0.0", 1)
-
-
-def test_a_daemon_serves_its_status(tmp_path):
-    address = free_endpoint().rpartition("/")[2]
-    with (
-        daemon_process(tmp_path, metrics={"listen": address}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        outsider.wait_status(lambda status: status["state"] == "waiting for map")
-
-        def metrics():
-            with OPENER.open(f"http://{address}/metrics", timeout=60) as answer:
-                return parsed(answer.read().decode())
-
-        until(lambda: metrics()["fasaco_edge_state", ('state="waiting for map"',)])
-        assert metrics()["fasaco_edge_memory_bytes", ()] > 1e7

@@ -23,8 +23,6 @@ from tests.support.rooms import (
     pillared_room,
     pose_bytes,
     room,
-    two_rooms,
-    update_bytes,
 )
 from tests.wire import oracle
 
@@ -253,32 +251,6 @@ def fresh(tmp_path):
         yield client
 
 
-def test_an_update_that_opens_a_door_leads_to_a_new_path(fresh):
-    closed, opened = two_rooms(door=False), two_rooms(door=True)
-    receiver = fresh.listen("path")
-    fresh.put("map", map_bytes(closed))
-    fresh.put("pose", pose_bytes(*START))
-    first = receiver.wait(lambda heard: True)
-    west = {cell for cell in coverable_cells(closed) if cell[1] < 10}
-    assert set(cells_of(planned(first)[0])) == west
-    status = fresh.wait_status(lambda status: status["coverage"] is not None)
-    assert status["coverage"]["unreachable"] == len(coverable_cells(closed)) - len(west)
-
-    fresh.put("map_update", update_bytes(opened, 2.5, 0.5, 3.5, 2.5))
-    second = receiver.wait(lambda heard: True, since=1)
-    assert set(cells_of(planned(second)[0])) >= coverable_cells(opened) - set(
-        cells_of(np.array([START]))
-    )
-    assert about(second)["revision"] == 2
-    assert about(second)["map_revision"] == 2
-    assert "cells more" in about(second)["reason"]
-
-    # A door that is shut again cuts the path off, and a new one stays on this side.
-    fresh.put("map_update", update_bytes(closed, 2.5, 0.5, 3.5, 2.5))
-    third = receiver.wait(lambda heard: set(cells_of(planned(heard)[0])) <= west, since=2)
-    assert about(third)["map_revision"] == 3
-
-
 def test_poses_may_come_as_other_messages_that_say_so(fresh):
     receiver = fresh.listen("path")
     fresh.put("map", map_bytes(room(3.0, 3.0)))
@@ -292,19 +264,3 @@ def test_poses_may_come_as_other_messages_that_say_so(fresh):
     fresh.wait_status(lambda status: status["errors"]["by_code"] == {"malformed_message": 1})
     fresh.put("pose", pose_bytes(1.35, 0.75), "")
     fresh.wait_status(lambda status: status["pose"]["x"] == 1.35)
-
-
-def test_a_robot_that_covers_all_is_done(fresh):
-    pixels = room(1.5, 1.2)
-    receiver = fresh.listen("path")
-    fresh.put("map", map_bytes(pixels))
-    fresh.put("pose", pose_bytes(0.45, 0.45))
-    points, _ = planned(receiver.wait(lambda heard: True))
-    for x, y in points:
-        fresh.put("pose", pose_bytes(x, y))
-    status = fresh.wait_status(lambda status: status["state"] == "done")
-    assert status["coverage"]["remaining"] == 0
-    assert status["coverage"]["covered"] == len(coverable_cells(pixels)) == len(points)
-    last = receiver.wait(lambda heard: True, since=1)
-    assert len(planned(last)[0]) == 0
-    assert about(last)["reason"] == "every reachable cell is covered"

@@ -90,12 +90,6 @@ def test_an_unknown_query_lists_the_known_ones(covering, name):
     assert all(known in answer["message"] for known in RPC_NAMES)
 
 
-@pytest.mark.parametrize("name", ["path", "status", "coverage", "pheromone", "config", "version"])
-def test_a_known_query_gets_one_answer(covering, name):
-    (reply,) = get(covering, f"@rpc/{name}")
-    assert str(reply.ok.key_expr) == f"{covering.prefix}/@rpc/{name}"
-
-
 def test_a_query_for_everything_changes_nothing(covering):
     before = covering.ask_status()["plan"]["plans"]
     replies = get(covering, "@rpc/*")

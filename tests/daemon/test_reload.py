@@ -11,6 +11,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.daemon.reload import (
     CHANGEABLE,
+    FIXED,
     Reload,
     changed_keys,
     is_changeable,
@@ -110,9 +111,10 @@ def test_an_invalid_file_changes_nothing(caplog):
 
 
 def test_every_changeable_key_is_one():
-    sections = ("robot", "map", "mission")
+    sections = ("robot", "map", "mission", "planner")
     keys = {f"{n}.{k}" for n in sections for k in getattr(RUNNING, n).__struct_fields__}
-    assert {"planner"} | keys >= CHANGEABLE
+    assert {"planner", "map", "mission"} | keys >= CHANGEABLE
+    assert keys >= FIXED
     assert is_changeable("planner.ants")
     assert not is_changeable("robot.name")
     # What the memory is shared out by, once.

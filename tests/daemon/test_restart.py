@@ -165,19 +165,6 @@ def test_another_building_is_reported_and_covered_from_zero(covered):
         assert outsider.ask_status()["ledger"]["restored_cells"] == 1
 
 
-def test_a_map_that_has_just_begun_keeps_the_progress(covered):
-    """A mapper restarted with the daemon knows only what is around the robot."""
-    small = np.where(np.hypot(*np.indices(HALL.shape)) < 20, HALL, -1).astype(np.int8)
-    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
-        begin(outsider, small)
-        status = begin(outsider, HALL)
-        assert status["errors"]["total"] == 0
-        assert (
-            outsider.wait_status(lambda s: s["map"]["revision"] == 2)["coverage"]["covered"]
-            == COVERED
-        )
-
-
 def test_a_second_daemon_for_the_robot_is_refused(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         outsider.ask_status()

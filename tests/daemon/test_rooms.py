@@ -102,18 +102,3 @@ def test_rooms_are_named_ordered_and_known_again(tmp_path):
         # A reset forgets what is swept, and no room.
         command(outsider, "reset")
         assert [room["name"] for room in rooms_of(outsider)["rooms"]].count("kitchen") == 1
-
-
-def test_a_broken_file_of_rooms_is_only_a_named_fault(tmp_path):
-    state = tmp_path / "state"
-    state.mkdir()
-    (state / "robot.rooms.json").write_text("{}")
-    with (
-        daemon_process(tmp_path, mission={"autostart": False, "state_dir": str(state)}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        outsider.listen("rooms").wait(lambda sample: True)
-        status = outsider.wait_status(lambda status: status["errors"]["total"] == 1)
-        assert status["errors"]["by_code"] == {"rooms_file": 1}
-        assert rooms_of(outsider)["rooms"] == []
-    assert [path.name for path in state.glob("robot.rooms.json*")] != ["robot.rooms.json"]

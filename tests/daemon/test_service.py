@@ -70,20 +70,12 @@ def rewritten(running: Daemon, **sections) -> None:
     running.process.send_signal(signal.SIGHUP)
 
 
-def test_a_reload_is_announced_and_takes_effect(tmp_path):
-    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
-        rewritten(running, planner={"seed": 7})
-        reloading = manager.wait("RELOADING=1")
-        assert "\nMONOTONIC_USEC=" in reloading
-        manager.wait("READY=1")
-        assert outsider.ask("@rpc/config").json()["planner"]["seed"] == 7
-        status = outsider.wait_status(lambda status: status["config"]["planner"]["seed"] == 7)
-        assert status["errors"]["total"] == 0
-
-
-def test_a_trouble_is_the_same_one_after_a_reload(tmp_path):
+def test_a_reload_is_announced_takes_effect_and_keeps_troubles(tmp_path):
     mission = {"lost_pose_s": 0.5}
-    with service(tmp_path, mission=mission) as (running, _), Outsider(running.endpoint) as outsider:
+    with (
+        service(tmp_path, mission=mission) as (running, manager),
+        Outsider(running.endpoint) as outsider,
+    ):
 
         def since_s(status):
             return sum(one["since_s"] for one in status["troubles"] if one["code"] == "no_pose")
@@ -92,10 +84,14 @@ def test_a_trouble_is_the_same_one_after_a_reload(tmp_path):
         outsider.put("pose", pose_bytes(1.0, 1.0))
         before = outsider.wait_status(lambda status: since_s(status) > 1.0)
         rewritten(running, planner={"seed": 7})
+        assert "\nMONOTONIC_USEC=" in manager.wait("RELOADING=1")
+        manager.wait("READY=1")
+        assert outsider.ask("@rpc/config").json()["planner"]["seed"] == 7
         after = outsider.wait_status(
             lambda status: status["config"]["planner"]["seed"] == 7 and since_s(status)
         )
         assert since_s(after) > since_s(before)
+        assert after["errors"]["total"] == 0
 
 
 def test_a_large_mask_is_read_beside_the_loop(tmp_path):

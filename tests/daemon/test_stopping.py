@@ -110,6 +110,15 @@ def test_a_killed_daemon_leaves_no_recorder(tmp_path):
     assert list(tmp_path.glob("*.rrd"))
 
 
+def test_ctrl_c_leaves_its_recorder_alone(tmp_path):
+    """Ended with its daemon, it missed the last messages: a replay had a cell less than a review.
+
+    A terminal sends Ctrl-C to the process group.
+    """
+    with recording_into(tmp_path) as (running, recorder):
+        assert os.getpgid(recorder) != os.getpgid(running.pid)
+
+
 def test_a_recorder_that_hangs_does_not_hold_the_end_up(tmp_path):
     with recording_into(tmp_path) as (running, recorder):
         os.kill(recorder, signal.SIGSTOP)

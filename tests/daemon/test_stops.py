@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import signal
 import time
 
 import pytest
-import yaml
 
 from tests.daemon.test_mask_topic import MISSION, put_mask
 from tests.daemon.test_mission import planned
@@ -14,12 +12,10 @@ from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
 from tests.support.router import router_process
-from tests.support.service_manager import Manager
 
 ROOM = room(6.0, 4.0)
 BLANK = fill(ROOM, 0.0, 0.0, 6.0, 4.0, FREE)
 OVER_ROBOT = fill(BLANK, 0.3, 0.3, 2.0, 2.0, WALL)
-KEEP_OUT = [[0.3, 0.3], [2.0, 0.3], [2.0, 2.0], [0.3, 2.0]]
 
 
 def drive(outsider, paths):
@@ -43,13 +39,6 @@ def stops(heard):
 
 
 @pytest.fixture
-def manager(tmp_path):
-    running = Manager(tmp_path)
-    yield running
-    running.close()
-
-
-@pytest.fixture
 def bus():
     """The ``bus`` section of daemons at a router that outlives them."""
     endpoint = free_endpoint()
@@ -69,23 +58,6 @@ def test_a_mask_over_a_driving_robot(tmp_path):
         paths.wait(stops, since)
         status = outsider.wait_status(lambda status: status["state"] == "blocked")
         assert status["reason"].startswith("robot is in a keep-out zone")
-        assert stops(paths.heard[-1])
-
-
-def test_a_keep_out_zone_over_a_driving_robot_by_reload(tmp_path, manager):
-    with (
-        daemon_process(tmp_path, env={"NOTIFY_SOCKET": manager.address}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        paths = outsider.listen("path")
-        since = drive(outsider, paths)
-        file = running.log.with_suffix(".yaml")
-        settings = yaml.safe_load(file.read_text())
-        settings.setdefault("mission", {})["keep_out"] = [KEEP_OUT]
-        file.write_text(yaml.safe_dump(settings))
-        running.process.send_signal(signal.SIGHUP)
-        paths.wait(stops, since)
-        outsider.wait_status(lambda status: status["state"] == "blocked")
         assert stops(paths.heard[-1])
 
 

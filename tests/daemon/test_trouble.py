@@ -94,7 +94,7 @@ def test_all_outputs_report_a_dead_dock(tmp_path):
             examined = session.peers(CheckContext(DaemonConfig(bus=bus)))
             assert examined.level is Level.WARN
             assert "does not charge" in examined.found
-            digest = looker.wait("state", lambda seen: seen.get("in_trouble"))
+            digest = looker.wait("state", lambda seen: seen.get("look") == "bad")
             assert digest["state"] == "charging"
             assert any("does not charge" in fault for fault in digest["faults"])
             told = diagnostics.wait(lambda heard: b"does not charge" in heard.payload)
@@ -105,7 +105,7 @@ def test_all_outputs_report_a_dead_dock(tmp_path):
         battery.step = 0.005
         with battery.on():
             outsider.wait_status(lambda status: not status["troubles"])
-            looker.wait("state", lambda seen: seen.get("in_trouble") is False)
+            looker.wait("state", lambda seen: seen.get("look") == "go")
     assert "does not charge: its level falls" in daemon.log_text()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.deploy.robots import robot, swept_m2
-from tests.deploy.service import QUIET, Service, wait_for
+from tests.deploy.service import Service, wait_for
 
 
 def reload(service: Service) -> None:
@@ -28,21 +28,3 @@ def test_a_valid_reload_takes_effect_during_a_mission(service: Service):
     assert service.pid == process
     assert "robot.name: needs a restart" in service.text()
     assert "configuration read again: planner.ants" in service.text()
-
-
-def test_a_wrong_one_is_kept_out(service: Service):
-    service.start()
-    process = service.pid
-    before = service.ask("config")
-    service.configure("planner: {ants: many}\n")
-    reload(service)
-    wait_for(lambda: "refused" in service.show("StatusText"), 5.0, "said")
-    assert "planner.ants" in service.show("StatusText")
-    assert service.ask()["errors"]["by_code"] == {"bad_configuration": 1}
-    (refused,) = [entry for entry in service.journal() if entry["PRIORITY"] == "3"]
-    assert "planner.ants" in refused["MESSAGE"]
-    assert service.ask("config") == before
-    assert service.pid == process
-    service.configure(**QUIET)
-    reload(service)
-    wait_for(lambda: "refused" not in service.show("StatusText"), 5.0, "all is well again")

@@ -2,6 +2,7 @@
 
 import subprocess
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,9 @@ import yaml
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.cli import _parser, main
+from fasaco_edge.cli import _parser
 from fasaco_edge.cli.follow import settings_of
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.follow.estimate import VelocityCommand
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.host.processes import cpu_seconds, own_mb
@@ -37,13 +39,18 @@ def base():
     base.close()
 
 
-@pytest.mark.parametrize(("words", "pace"), [((), 5.0), (("--speed", "2"), 2.0)])
-def test_its_time_is_that_of_the_configuration(tmp_path, words, pace):
-    """As that of `simulate`: at another one it hit walls."""
+@pytest.mark.parametrize(
+    ("scale", "words", "pace"),
+    [(1, (), 1.0), (1, ("--speed", "2"), 2.0), (5, ("--speed", "5"), 5.0), (5, (), None)],
+)
+def test_only_an_option_gives_it_another_time(tmp_path, scale, words, pace):
+    """A scale left over in a real robot's configuration did, too."""
     config = tmp_path / "robot.yaml"
-    config.write_text("robot: {time_scale: 5}")
+    config.write_text(f"robot: {{time_scale: {scale}}}")
     given = ["follow", "--config", str(config), *words]
-    assert settings_of(_parser(given).parse_args(given)).pace == pace
+    args = _parser(given).parse_args(given)
+    with nullcontext() if pace else pytest.raises(BadConfiguration, match="time_scale is 5"):
+        assert settings_of(args).pace == pace
 
 
 def test_it_drives_twenty_times_a_second_and_stays_small(base, tmp_path):
@@ -179,24 +186,6 @@ def test_a_robot_whose_localiser_or_odometry_is_silent_stands(base, tmp_path, si
 
 def velocity(sample):
     return decode_velocity(sample.payload, schemas.TWIST_STAMPED)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--pose-age", "nan"], "must be in (0.05, 10] s"),
-        (["--speed", "0"], "--speed must be above 0"),
-        (["--config", "/nowhere.yaml"], "/nowhere.yaml"),
-        (["--robot", "a/b"], "must be chunks of letters"),
-    ],
-)
-def test_mistakes_are_named(words, said, capsys):
-    try:
-        code = main(["follow", *words])
-    except SystemExit as ended:
-        code = ended.code
-    assert code in (2, 78)
-    assert said in capsys.readouterr().err
 
 
 def test_it_takes_scans_and_compares_them_with_the_map(base, tmp_path):

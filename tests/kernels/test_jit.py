@@ -47,13 +47,6 @@ def test_changed_sources_never_meet_the_code_of_others(compiled):
     assert not Path(told.folder).exists()
 
 
-def test_compiled_kernels_are_loaded(installed):
-    first = installed.compile()
-    assert (first.loaded, first.compiled, first.warnings) == (0, 2, [])
-    again = installed.tell()
-    assert (again.loaded, again.compiled, again.warnings) == ALL_LOADED
-
-
 def test_code_for_another_processor_is_not_run(compiled):
     """As in a folder that was copied from another robot."""
     other = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}

@@ -62,18 +62,6 @@ def test_an_order_covers_a_zone_by_its_name():
     assert cells_of(0, 6, 3, 9) <= drive.visited
 
 
-def test_a_name_that_is_not_there_is_refused_with_those_that_are():
-    drive = drive_with(zones=(KITCHEN,))
-    drive.command("start", {"zones": [{"name": "hall"}]})
-    assert drive.refused.code == "bad_order"
-    assert "zones[0].name: no zone 'hall'" in str(drive.refused)
-    assert "there are kitchen" in str(drive.refused)
-    assert drive.mission.state == "idle"
-    without = drive_with()
-    without.command("start", {"zones": [{"name": "kitchen"}]})
-    assert "it has none" in str(without.refused)
-
-
 def test_configured_keep_out_zones_apply_to_each_order():
     drive = drive_with(keep_out=(COLUMN,))
     drive.command("start")

@@ -56,16 +56,6 @@ def test_without_an_order_it_stands_with_that_reason():
     assert drive.visited == {(0, 0), (0, 1), (0, 2), (0, 3)}, "it counts all the same"
 
 
-def test_an_order_for_everything_covers_all_reachable_cells():
-    drive = idle(*ROOM)
-    decision = drive.command("start")
-    assert decision.plan.reason == "everything reachable"
-    assert drive.mission.state is State.PLANNING
-    follow(drive)
-    assert drive.visited == cells(0, 0, 6, 8)
-    assert drive.mission.reason == "every reachable cell is covered"
-
-
 def test_zones_are_covered_one_after_the_other_and_nothing_else():
     drive = idle(*ROOM)
     assert drive.command("start", TWO_ZONES).plan.reason == "zone 'east'"
@@ -110,42 +100,12 @@ def test_an_order_covers_all_again_unless_it_says_otherwise():
     follow(drive)
 
 
-def test_a_zone_forgets_only_its_own_cells():
-    drive = started(*ROOM)
-    drive.finish()
-    decision = drive.command("start", {"zones": [{"name": "west", "polygon": WEST}]})
-    assert decision.plan.problem.cells == 12 - (drive.cell in cells(0, 0, 6, 2))
-    assert cells(0, 2, 6, 8) <= drive.visited
-    follow(drive)
-    assert drive.visited == cells(0, 0, 6, 8)
-
-
-def test_the_robot_never_drives_into_a_keep_out_zone():
-    drive = idle(*ROOM)
-    drive.command("start", {"keep_out": [rectangle(1, 3, 4, 5)]})
-    follow(drive)
-    assert not set(drive.driven) & cells(1, 3, 4, 5)
-    assert drive.visited == cells(0, 0, 6, 8) - cells(1, 3, 4, 5)
-    (area,) = drive.mission.orders.uncovered.found().areas
-    assert (area.cells, area.reason) == (6, "in a keep-out zone")
-    assert area.cell in cells(1, 3, 4, 5)
-
-
 def test_cells_behind_a_keep_out_are_not_blamed_on_obstacles():
     drive = idle("........", "...#....")
     drive.command("start", {"keep_out": [rectangle(0, 4, 2, 5)]})
     follow(drive)
     found = {(area.reason, area.cells) for area in drive.mission.orders.uncovered.found().areas}
     assert found == {("in a keep-out zone", 2), ("closed off by a keep-out zone", 6)}
-
-
-def test_a_walk_home_is_part_of_the_last_plan():
-    drive = idle("....", "....", cell=(0, 0))
-    drive.command("start", {"return_home": True})
-    assert drive.request.problem.end == (0, 0)
-    follow(drive)
-    # A closed walk over two rows visits each cell once.
-    assert len(drive.driven) == 9
 
 
 def test_paused_it_stands_and_still_counts_what_it_passes_over():

@@ -9,7 +9,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.kernels.floor.turning import limited_turning, turn_seconds
-from fasaco_edge.mission.coverage.drive_meter import DriveMeter, DriveTimes
+from fasaco_edge.mission.core.drive_meter import DriveMeter, DriveTimes
 from fasaco_edge.simulation.robot import ARRIVED_M, DriveState, SimulationConfig, driven
 
 SLOW = SimulationConfig(turn_rad_s=0.5, turn_acceleration_rad_s2=0.6)

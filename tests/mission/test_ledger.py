@@ -1,6 +1,6 @@
 """Visits are counted by cell, as the tool passes over its centre."""
 
-import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -48,18 +48,6 @@ def test_a_straight_drive_visits_each_cell_on_it_once():
     assert entered[0] == {(0, 0)}
 
 
-def test_a_turn_on_the_spot_is_no_visit():
-    ledger = CoverageLedger(CELL)
-    for yaw in np.linspace(-math.pi, math.pi, 30):
-        ledger.record(Pose2D(0.5 * CELL, 0.5 * CELL, float(yaw)))
-    assert ledger.total == 1
-
-
-def test_poses_few_and_far_between_are_swept():
-    ledger, _ = drive((0.5, 0.5), (0.5, 0.5 + JUMP_CELLS))
-    assert counts(ledger) == {(0, 0): 1, (0, 1): 1, (0, 2): 1}
-
-
 def test_a_jump_is_not_swept():
     ledger, entered = drive((0.5, 0.5), (0.5, 0.6 + JUMP_CELLS))
     assert entered[1] == {(0, 2)}
@@ -103,12 +91,14 @@ def test_the_returned_array_is_a_copy():
 
 
 def test_visits_stop_counting_before_they_wrap():
-    ledger = CoverageLedger(CELL)
-    for _ in range(65_540):
+    nearly = np.full((TILE, TILE), 65_534, np.uint16)
+    ledger = CoverageLedger.restored(
+        replace(CoverageLedger(CELL).snapshot(), tiles={(0, 0): nearly})
+    )
+    for _ in range(3):
         ledger.record(Pose2D(0.5 * CELL, 0.5 * CELL))
         ledger.record(Pose2D(9.5 * CELL, 0.5 * CELL))
     assert ledger.visits(Window(0, 0, 1, 1))[0, 0] == 65_535
-    assert ledger.total == 2 * 65_540
 
 
 @examples(40)
@@ -163,15 +153,6 @@ def test_a_snapshot_stays_as_it_was():
         first.tiles[0, 0][0, 0] = 7
     with pytest.raises(TypeError):
         first.tiles[9, 9] = first.tiles[0, 0]
-
-
-def test_a_snapshot_copies_only_what_has_changed():
-    ledger, _ = drive((0.5, 0.5), (0.5, 200.5))
-    first = ledger.snapshot()
-    ledger.record(Pose2D(201.5 * CELL, 0.5 * CELL))
-    second = ledger.snapshot()
-    assert second.tiles[0, 0] is first.tiles[0, 0]
-    assert second.tiles[0, 3] is not first.tiles[0, 3]
 
 
 def test_a_restored_ledger_continues_without_a_difference():

@@ -8,10 +8,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
+from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.living_trail import branching
+from fasaco_edge.planners.paper.colony import ColonyConfig
+from fasaco_edge.planners.registry import planner_of
 from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, started
 
 ROOMS = (
@@ -160,6 +164,11 @@ def test_a_plan_starts_from_the_trail():
     assert seen is None
     drive.go(patch("#", at=(5, 9)))
     assert (drive.request.problem.trail.tau > 0.11).any()
+
+
+@pytest.mark.parametrize("name", ["colony-search", "fasaco"])
+def test_the_daemons_planners_with_ants_plan_on_the_trail(name):
+    assert mission_config(DaemonConfig(), planner_of(name, ColonyConfig())).plans_on_trail
 
 
 def test_missions_on_the_living_trail_are_reproducible():

@@ -98,29 +98,6 @@ def test_a_line_through_cells_has_passes_too():
     assert np.count_nonzero(np.diff(plans[2].cells[:, 0])) > 0.8 * plans[2].steps
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("--passes cross", r"--passes\[0\]: cross goes after a pass with lanes"),
-        ("--passes auto@2", "a pass at 2 m/s is faster than the robot, 0.25 m/s"),
-        ("--passes auto --planner fasaco", "--passes: only colony-search has passes"),
-        ("--passes auto --pheromone-png p.png", "has a trail of its own"),
-        ("--passes 30deg --line cells", "the centres of cells lie along the axes"),
-        ("--passes auto --turn-radius 0.3", "a robot that turns on the spot"),
-    ],
-)
-def test_impossible_passes_are_refused_with_the_reason(capsys, words, said):
-    assert main(["plan", "office", "--budget", "0.05", *words.split()]) == 78
-    assert said.replace("\\", "") in " ".join(capsys.readouterr().err.split())
-
-
-def test_an_unknown_pass_is_a_usage_error(capsys):
-    with pytest.raises(SystemExit) as caught:
-        main(["plan", "office", "--passes", "edge,corner"])
-    assert caught.value.code == 2
-    assert "got 'corner'" in capsys.readouterr().err
-
-
 def test_lanes_need_the_search():
     with pytest.raises(BadConfiguration, match="only colony-search has a direction"):
         fe.plan(fe.load_map("office"), lanes="rows", search=fe.Search(planner="fasaco"))

@@ -205,12 +205,13 @@ def test_a_plan_is_one_line_of_text_and_a_picture():
     passes = fe.plan_passes(office, passes=["edge", "auto"], search=QUICK)
     for shown in (office, free, planned, fe.plan(free, search=QUICK), passes):
         assert "\n" not in repr(shown)
-        assert len(repr(shown)) < 160
+        assert len(repr(shown)) < 200
     assert re.fullmatch(
         r"<Plan office.yaml, colony-search: 9\d\.\d % of 40.9 m2 swept, \d+ min \d\d s, "
-        r"[\d.]+ m, \d+ quarter-turns, at most \d+ % above the shortest time>",
+        r"[\d.]+ m, \d+ quarter-turns, \d+ % above \d+ min \d\d s, the time to sweep as much .*>",
         repr(planned),
     )
+    assert dict(rows_of(planned))["gap"].removeprefix("line: ") in repr(planned)
     assert "40.9 m2 (" in repr(passes)
     for drawn in (planned, passes):
         with Image.open(io.BytesIO(drawn._repr_png_())) as picture:

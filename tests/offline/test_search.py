@@ -123,15 +123,28 @@ def test_a_requested_share_is_searched_for_beyond_the_budget():
     assert shares[1] >= 0.994 > shares[0]
 
 
-def test_ctrl_c_ends_even_the_first_line(monkeypatch):
+class Emergency:
+    """A criterion of a program's own."""
+
+    cuts_first_line = False
+
+    def __call__(self, progress: object) -> bool:
+        return self.cuts_first_line
+
+
+@pytest.mark.parametrize("stop", [Interrupt(), Emergency()], ids=["Ctrl-C", "own"])
+def test_ctrl_c_ends_even_the_first_line(monkeypatch, stop):
     """On a large map that line takes half a minute, which Ctrl-C did not shorten."""
-    pieces, ctrl_c = [], Interrupt()
+    pieces = []
 
     def annealed(*given):
-        ctrl_c.asked.set()
+        if isinstance(stop, Interrupt):
+            stop.asked.set()
+        else:
+            stop.cuts_first_line = True
         pieces.append(anneal(*given))
 
     monkeypatch.setattr("fasaco_edge.planners.line.anneal", annealed)
-    plan = fe.plan(fe.load_map("flat"), stop=ctrl_c)
+    plan = fe.plan(fe.load_map("flat"), stop=stop)
     assert (len(pieces), plan.ended_by) == (1, "Ctrl-C")
     assert plan.swept_share > 0.9

@@ -141,6 +141,14 @@ def test_a_repair_is_worth_its_while():
     assert np.mean(gains) > 5
 
 
+def test_a_repair_without_ants_works_as_much():
+    problem = driven_halfway(0, change=0.1, cost=TURNS)
+    paths = [NearOptimal(has_ants=has_ants).plan(problem, never) for has_ants in (True, False)]
+    assert paths[0].work.ants > 0
+    assert paths[1].work.ants == 0
+    assert paths[1].work.proposals > 0.5 * paths[0].work.proposals
+
+
 @examples(30)
 @given(seed=st.integers(0, 10**6), pieces=st.integers(0, 5))
 def test_the_same_work_repairs_the_same_way(seed, pieces):

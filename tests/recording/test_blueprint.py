@@ -13,6 +13,7 @@ from PIL import Image
 pytest.importorskip("rerun")
 
 from fasaco_edge.recording.scene import archetypes
+from fasaco_edge.recording.scene.curves import DETAILS
 from tests.support import viewer
 from tests.support.recordings import bus_on_free_port, recorder_process
 from tests.support.scripted_mission import Mission
@@ -38,7 +39,7 @@ def shot(tmp_path_factory):
 
 def test_no_view_complains(shot):
     assert shot.complaints == ()
-    assert len(shot.views) == 11
+    assert len(shot.views) == 6 + len(DETAILS)
     assert {
         "Map, swept floor, track and path",
         "Pheromone that ants follow (bright: much), and the path of that time (white)",

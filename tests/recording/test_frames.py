@@ -197,7 +197,7 @@ LYING_CHUNKS = {
     ),
     "columns that are packed, too": (
         lambda: chunk_of(ZEROS, options=pa.ipc.IpcWriteOptions(compression="zstd")),
-        "columns that are compressed",
+        "compressed columns",
     ),
     "a list of two thousand million nothings": (
         of_nothings,

@@ -13,9 +13,9 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes
+from fasaco_edge.recording.scene.curves import PERIOD_NS, Curves
 from fasaco_edge.recording.scene.drawings import LOGGED_AGAIN_NS, PathDrawing
 from fasaco_edge.recording.scene.layers import BURST_S, RATES, Anchor, Layers, size_in_file
-from fasaco_edge.recording.scene.status_curves import PERIOD_NS, Curves
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.messages.paths import PathMessage
 from tests.support.recordings import SCALAR, TEXT, read_column, writer_in

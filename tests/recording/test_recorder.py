@@ -52,6 +52,7 @@ from tests.support.scripted_mission import (
     building,
 )
 from tests.support.senders import Sender
+from tests.wire.schemas import check
 
 ERRORS = {"total": 2, "last": "", "by_code": {"malformed_message": 2, "no code": 3}}
 FRAMES = 40
@@ -113,7 +114,7 @@ def test_everything_on_the_bus_becomes_an_entity(recorded):
     assert 2 < rows[entities.PHEROMONE] <= recorded.mission.revision
     assert rows[entities.ROBOT] == FRAMES
     assert rows[entities.FLOOR] == FRAMES // 4
-    assert {entities.MAP, entities.DRIVEN_PATH, f"{entities.LATENCY}/plan"} <= set(rows)
+    assert {entities.MAP, entities.DRIVEN_PATH, "metrics/latency/plan"} <= set(rows)
     assert recorded.summary.timelines == (entities.REPLAN, entities.WALL_CLOCK)
     assert 0.9 * FRAMES * FRAME_S < recorded.summary.duration_s < 300
 
@@ -177,10 +178,9 @@ def test_paths_are_logged_and_their_numbers_are_curves(recorded):
     # All came within a minute, for one reason: of them the layout shows the first.
     levels = read_column(recorded.path, entities.PATH_LOG, "TextLog:level").values
     assert levels == [["INFO"], ["INFO"], *[["DEBUG"]] * (revision - 2)]
-    assert len(read_column(recorded.path, entities.GAP, SCALAR).values) == revision
-    assert {
-        value for (value,) in read_column(recorded.path, entities.PROCESSOR, SCALAR).values
-    } == {20}
+    assert len(read_column(recorded.path, "metrics/plan/gap", SCALAR).values) == revision
+    processor = read_column(recorded.path, "metrics/resources/processor", SCALAR).values
+    assert {value for (value,) in processor} == {20}
 
 
 def test_the_robot_and_the_ends_of_its_track_are_drawn(recorded):
@@ -247,6 +247,7 @@ def test_the_card_says_how_it_ended_from_then_on_only(recorded):
 
 def test_a_malformed_sample_affects_no_other(recorded):
     report = recorded.report
+    check("recorder.json", report)
     assert (report["malformed"], report["lost"], report["state"]) == (1, 0, "recording")
     assert 0 < report["rss_mb"] < 400
     lines = read_column(recorded.path, entities.BUS_LOG, "TextLog:text").values

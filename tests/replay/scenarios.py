@@ -12,7 +12,6 @@ import numpy as np
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.grid.lattice import COVERABLE
-from fasaco_edge.grid.occupancy import UNKNOWN
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.replay.mission_drive import ReplayStep
 from fasaco_edge.replay.replay import Replay, read_run
@@ -39,11 +38,6 @@ class Story:
         return [
             fault.code for step in self.news for fault in (*step.refused, *step.decision.faults)
         ]
-
-    @property
-    def visited(self) -> set[Cell]:
-        """Cells that the mission holds for covered, of those on its map."""
-        return visited(self.mission)
 
     def outline(self) -> list[tuple]:
         """Return all that was decided, for comparison."""
@@ -104,22 +98,6 @@ def left(mission: Mission) -> set[Cell]:
     return {(row + window.row0, col + window.col0) for row, col in found} - visited(mission)
 
 
-def stands_on_unknown(mission: Mission) -> bool:
-    """Tell whether the map does not know part of the ground around the robot's cell."""
-    pose, grid, cell_m = mission.pose.pose, mission.grid, mission.lattice.cell_m
-    x, y = ((math.floor(at / cell_m) + 0.5) * cell_m for at in (pose.x, pose.y))
-    col0, row0 = grid.geometry.to_pixels(x - 0.5 * cell_m, y - 0.5 * cell_m)
-    col1, row1 = grid.geometry.to_pixels(x + 0.5 * cell_m, y + 0.5 * cell_m)
-    around = grid.cells[math.floor(row0) : math.ceil(row1), math.floor(col0) : math.ceil(col1)]
-    return bool(np.any(around == UNKNOWN))
-
-
-def driven_m(samples: Samples, poses: Sequence[int]) -> float:
-    """Return how far the robot drives over some of its poses [m]."""
-    way = [decode_pose(samples[index].sample.payload, POSE_STAMPED).pose for index in poses]
-    return sum(math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(way))
-
-
 def under_tool(samples: Iterable[Arrival], tool_m: float) -> set[Cell]:
     """Return the cells whose centre the tool has passed over, drive by drive."""
     poses = [decode_pose(s.sample.payload, POSE_STAMPED).pose for s in samples if s.topic == "pose"]
@@ -144,12 +122,6 @@ def places(samples: Samples, topic: str) -> list[int]:
 def without(samples: Samples, dropped: Sequence[int]) -> Samples:
     """Drop some."""
     return [sample for index, sample in enumerate(samples) if index not in set(dropped)]
-
-
-def late(samples: Samples, topic: str, by_ns: int) -> Samples:
-    """Let all of a topic come later."""
-    result = [moved(s, by_ns) if s.topic == topic else s for s in samples]
-    return sorted(result, key=lambda sample: sample.wall_ns)
 
 
 def changed(samples: Samples, index: int, change: Callable[[bytes], bytes]) -> Samples:

@@ -86,6 +86,8 @@ def test_each_decision_equals_the_recorded_one(which, request):
     replay, record, steps = played(samples)
     assert record.gap == ""
     assert replay.difference is None
+    for _, status in recording.statuses:
+        check("status.json", status)
     # A busy daemon takes several poses in a turn.
     assert replay.turns == record.turns > 20
     paths = [step.as_recorded for step in steps if step.decision.path is not None]

@@ -9,8 +9,8 @@ import pytest
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.comparison import figures
 from fasaco_edge.review.document import ReviewDocument
+from fasaco_edge.review.figures import figures
 from fasaco_edge.review.floor_and_rooms import swept_floor
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport

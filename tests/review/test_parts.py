@@ -186,7 +186,7 @@ def test_the_newest_of_several_runs_is_reviewed(parts, other, capsys):
     assert main(["review", *map(str, (*parts, *other)), "--json"]) == 0
     told = capsys.readouterr()
     assert json.loads(told.out)["recording"] == newest
-    assert f"2 runs: this is the newest, {newest}; for another one" in told.err
+    assert f"2 runs: this is the newest, {newest}; for another run" in told.err
     assert f"as {earlier}-*.rrd" in told.err
 
 

@@ -214,7 +214,7 @@ def test_floor_swept_before_the_recording_is_not_called_left(review):
     late = with_floor(review, 2.0, 2.3)
     (spot,) = explain(late, [(0.9, 0.7)])
     assert (spot.why, spot.swept) == ("not known", None)
-    assert "when that began, 1.9 m2 had been swept" in spot.words
+    assert "before the recording 1.9 m2 were swept" in spot.words
     assert document_of(late).swept_before_m2 == pytest.approx(1.9, abs=0.05)
     swept = dict(screen_rows(late, document_of(late)))["floor swept"]
     assert swept.endswith("by recorded poses, and 1.9 m2 before the recording")

@@ -30,8 +30,12 @@ def status(**members: object) -> Status:
 
 def told(of: Status) -> list[str]:
     """Return all texts for an owner about a status."""
-    word = plain.WORDS.get(of.state, of.state)
-    return [word, plain.does(of), *plain.needs(of), *(part.reason for part in plain.left(of))]
+    return [
+        plain.word(of.state),
+        plain.does(of),
+        *plain.needs(of),
+        *(part.reason for part in plain.left(of)),
+    ]
 
 
 @pytest.mark.parametrize("state", STATES)

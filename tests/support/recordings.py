@@ -259,7 +259,7 @@ def read_summary(path: Path) -> RecordingSummary:
         ended_ns=int(np.max(spans)) if spans else 0,
         complete=scan is not None and scan.has_footer,
         covered=_last_scalar(path, entities.COVERED_FRACTION),
-        recovered=_last_scalar(path, entities.REVISITED_FRACTION),
+        recovered=_last_scalar(path, "metrics/coverage/recovered"),
         paths=_texts(path, entities.PATH_LOG, TEXT),
         states=_texts(path, entities.MISSION_STATE, STATE),
     )

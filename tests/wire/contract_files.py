@@ -2,7 +2,8 @@
 
 From ``fasaco_edge.wire.topics``: keys and queries of ``keys.yaml``, ``qos.yaml``, the key
 expressions of the session templates, the tables of the pages. From the typed documents: the
-schemas, see ``tests.wire.make_schemas``, and rows of members, see ``tests.wire.page_rows``.
+schemas, see ``tests.wire.make_schemas``, and rows of members, see ``tests.wire.page_rows``. From
+``fasaco_edge.states``: the table of states.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import yaml
 
 from fasaco_edge.bus import access
 from fasaco_edge.host.resources import folder
+from fasaco_edge.states import State
 from fasaco_edge.wire.query_table import QUERIES, Query
 from fasaco_edge.wire.topic_types import Topic
 from fasaco_edge.wire.topics import QOS, TOPICS
@@ -155,6 +157,12 @@ def error_rows() -> list[str]:
     ]
 
 
+def state_rows() -> list[str]:
+    """Return the rows of the states."""
+    meant = make_schemas.descriptions(State.__doc__ or "")
+    return [_row(f"`{state.value}`", meant[state.name]) for state in State]
+
+
 def wildcard_rows() -> list[str]:
     """Return the rows of the wildcards."""
     return [_row(f"`{expression}`", matched) for expression, matched in WILDCARDS.items()]
@@ -274,6 +282,7 @@ TABLES: Mapping[str, Callable[[], list[str]]] = {
     "query": query_rows,
     "expression": wildcard_rows,
     "code": error_rows,
+    "state | meaning": state_rows,
 }
 
 

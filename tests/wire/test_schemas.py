@@ -10,7 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator, ValidationError
 
 from fasaco_edge.errors import NotYet
-from fasaco_edge.wire.documents.replies import STATES, TROUBLES, encode_error
+from fasaco_edge.wire.documents.replies import TROUBLES, encode_error
 from tests.wire.contract_files import CONTRACT, PROTOCOL, load
 from tests.wire.make_schemas import files
 from tests.wire.page_rows import MEMBERS, members_in, with_members
@@ -61,12 +61,6 @@ def test_a_member_without_row_and_description_is_an_error():
     row = re.search(r"^\| `ordered` \|.*\n", CONTRACT, re.MULTILINE)
     with pytest.raises(LookupError, match="describe ordered below `Attributes:`"):
         with_members(CONTRACT.replace(row[0], ""), "member of `mission`")
-
-
-def test_the_contract_has_the_states():
-    table = CONTRACT.partition("\n| state |")[2].partition("\n\n")[0]
-    cells = "".join(line.split(" | ")[0] for line in table.splitlines()[2:])
-    assert re.findall(r"`([^`]+)`", cells) == list(STATES)
 
 
 def test_the_contract_has_the_troubles():

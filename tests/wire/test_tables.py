@@ -34,7 +34,7 @@ def test_a_role_has_the_rights_of_the_table_of_topics(row):
     assert row in CONTRACT
 
 
-@pytest.mark.parametrize("table", ["key", "qos", "query", "wildcard", "error"])
+@pytest.mark.parametrize("table", ["key", "qos", "query", "wildcard", "error", "state"])
 def test_a_table_of_the_contract_is_that_of_the_data(table):
     """To write it: make contract."""
     rows = getattr(contract_files, f"{table}_rows")()

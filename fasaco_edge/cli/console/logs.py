@@ -141,7 +141,7 @@ def begin_logging(level: str) -> None:
 
 
 def report_error(error: FasacoError) -> None:
-    """Print or log the reason of a command's failure, or all of a document, with the hints."""
+    """Print or log why a command fails, for a document all its faults, with the hints."""
     rest = error.rest if isinstance(error, DocumentError) else ()
     if is_journal():
         for fault in (error, *rest):

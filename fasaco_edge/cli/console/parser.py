@@ -22,7 +22,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:  # noqa: ANN401 - those of argparse
         super().__init__(**{"formatter_class": HelpText} | options)
-        # A value such as -1,2 is a position, and no option.
+        # A value such as -1,2 is a position, not an option.
         self._negative_number_matcher = re.compile(r"-\.?\d")
         self._given: Sequence[str] = ()
 
@@ -75,7 +75,7 @@ class Parser(argparse.ArgumentParser):
         except argparse.ArgumentError as error:
             if re.fullmatch(r"-?\d*,\d+", arg_string):
                 point = arg_string.replace(",", ".")
-                # No suggestion where the point is wrong, too, as an option takes whole numbers.
+                # No suggestion if a number with a point is wrong, too.
                 with suppress(argparse.ArgumentError):
                     super()._get_value(action, point)
                     error.message += f"; did you mean {point}?"

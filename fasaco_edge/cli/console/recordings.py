@@ -21,7 +21,7 @@ def files_of_a_run(paths: Sequence[Path]) -> list[Path]:
 
     Raises:
         DifferentRuns: the files are of several robots.
-        UnreadableRecording: a file is missing, or is no recording.
+        UnreadableRecording: a file is missing, or is not a recording.
     """
     fleets = [path for path in paths if is_fleet_recording(path)]
     runs: dict[str, list[Path]] = {}
@@ -33,12 +33,12 @@ def files_of_a_run(paths: Sequence[Path]) -> list[Path]:
     if len(robots) > 1:
         raise DifferentRuns(
             f"recordings of several robots: {', '.join(sorted(robots))}",
-            hint="name those of one robot at a time, or the one of their fleet",
+            hint="name the files of one robot at a time, or the recording of their fleet",
         )
     if len(runs) > 1:
         terminal.say(
             terminal.err(),
-            f"{len(runs)} runs: this is the newest, {max(runs)}; for another one name its files, "
+            f"{len(runs)} runs: this is the newest, {max(runs)}; for another run name its files, "
             f"such as {min(runs)}-*.rrd",
         )
     return [*(runs[max(runs)] if runs else []), *nameless]

@@ -44,7 +44,7 @@ class CleanStream:
 
     @contextmanager
     def printed_by(self, print_lines: Callable[[str], None]) -> Iterator[None]:
-        """Within the context, pass whole lines to ``print_lines``; a last partial line follows."""
+        """Within the context, pass whole lines to ``print_lines``; at its end, a partial line."""
         with self._lock:
             self._print = print_lines
         try:
@@ -66,7 +66,7 @@ class CleanStream:
 def open_missing_streams() -> None:
     """Open /dev/null for each standard stream that the caller has closed.
 
-    Otherwise the next opened file or socket gets the stream's number, and what is printed.
+    Otherwise the next opened file or socket gets the stream's number, and with it all output.
     """
     for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
         try:

@@ -25,7 +25,7 @@ EPILOG = """\
 summary.json and --json hold:
   map, complete    the building; whether every reachable cell was covered
   reachable_cells  counted by the daemon; with several daemons, by the one with most cells left
-  covered_cells    the same
+  covered_cells    counted in the same way
   reachable_m2     reachable floor of the true building
   swept_m2         floor swept along the true tracks of all robots
   swept_twice_m2   floor that two or more robots swept or drove through, by the same count;
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with naming(out):
         if args.out is None:
-            # Another user may have created this folder: the name is not chosen by the user.
+            # The name is fixed: another user may have created this folder.
             make_own_folder(RUNS)
             make_own_folder(out)
         out.mkdir(parents=True, exist_ok=True)

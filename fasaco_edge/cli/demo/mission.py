@@ -24,6 +24,7 @@ from fasaco_edge.cli.demo.view import demo_view
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.addresses import free_port
 from fasaco_edge.host.processes import python_program
+from fasaco_edge.states import AT_WORK
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import Status
@@ -33,9 +34,8 @@ STOP_TIMEOUT_S = 8.0
 RECORDERS_WITHIN_S = 60.0
 # Time for which the state must stay "done" [simulated s]: a last map may still arrive.
 SETTLE_SIM_S = 3.0
-# Programs that end after the robots, as they record them, by the names of their logs.
+# Names of the logs of programs that end after the robots, as these programs record them.
 LAST = ("daemon", "fleet")
-AT_WORK = ("planning", "covering", "degraded")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class MissionEnding:
         statuses: the last status of each daemon.
         wall_s: duration by this computer's clock [s].
         timed_out: whether the time limit ended the demo.
-        makespan_s: time from the first robot's start of work to the last one's end [simulated s].
+        makespan_s: time from the first robot's start of work to the last robot's end [simulated s].
     """
 
     statuses: tuple[Status, ...]
@@ -64,7 +64,7 @@ class DemoMission:
         self._view = demo_view([robot.name for robot in robots], self._endpoint)
         self._processes: list[tuple[Path, subprocess.Popen[bytes]]] = []
         self._stack = ExitStack()
-        # Log and arguments of each robot to start; keys of recorders that are not there yet.
+        # Log and arguments of each robot to start; keys of recorders that are not on the bus yet.
         self._waiting: list[tuple[Path, list[str]]] = []
         self._silent: set[str] = set()
         self._newest = [LatestSlot[Sample]() for _ in robots]

@@ -37,7 +37,7 @@ def demo_view(robots: Sequence[str], endpoint: str) -> LinesView | LiveView:
     """
     if _is_screen():
         try:
-            from fasaco_edge.watch import live  # noqa: F401 - its folder may have been taken away
+            from fasaco_edge.watch import live  # noqa: F401 - the folder may be missing
         except ModuleNotFoundError as error:
             if not (error.name or "").startswith("fasaco_edge.watch"):
                 raise

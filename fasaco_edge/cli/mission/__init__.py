@@ -236,7 +236,7 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
         "keep_covered": args.keep_covered,
         "until_min": args.until_min,
     }
-    # Not by truth: 0 passes are a fault to report.
+    # Compared with None, as 0 passes are a fault to report.
     given = {
         name: value for name, value in options.items() if value is not None and value is not False
     }

@@ -92,7 +92,6 @@ def asked_by(args: argparse.Namespace) -> dict[str, object]:
 
 
 def show_keep_outs(answer: replies.Reply) -> None:
-    """Print the keep-outs in an answer."""
     mission = answer.mission
     table = Table("name", "of", "corners", title="Keep-outs", title_justify="left")
     for keep_out in mission.keep_outs:

@@ -84,7 +84,6 @@ ROBOT, SEARCH = RobotConfig(), Search()
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add all options."""
     parser.add_argument(
         "map",
         metavar="MAP",

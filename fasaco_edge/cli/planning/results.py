@@ -142,7 +142,6 @@ def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
 
 
 def _table(under: RoomsUnderLine) -> Table:
-    """Return a table of the rooms."""
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in ("room", "floor", "swept", "entered"):
         table.add_column(name, justify="right", style="cyan" if name == "room" else "")

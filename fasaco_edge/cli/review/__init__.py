@@ -130,7 +130,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs((args.png,), recordings)
     _check_together(args)
     for file in recordings:
-        with open_part(file):  # raises for a file that is no recording, before slow imports
+        with open_part(file):  # raises if a file is not a recording, before slow imports
             pass
     from fasaco_edge.cli.console.recordings import files_of_a_run
     from fasaco_edge.recording.read.frames import is_fleet_recording

@@ -15,11 +15,11 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import (
     compared_rows,
-    figures,
     setup_differences,
     setup_words,
 )
 from fasaco_edge.review.document import ReviewDocument
+from fasaco_edge.review.figures import figures
 from fasaco_edge.review.output import rows
 from fasaco_edge.review.output.answers import verdicts
 from fasaco_edge.text import one_line

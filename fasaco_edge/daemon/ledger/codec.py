@@ -27,10 +27,10 @@ Little endian:
     fleet      cells swept by other robots, JSON (``fleet.mission.shared``)
     note       UTF-8, up to the end: JSON of the order, with a version of its own; may be empty
 
-Earlier versions are read, too; each lacks more than the one after it. Version 4, written if the
-cells are aligned with the axes of the map frame, lacks ``angle``. Version 3, written if there is
-also no fleet, lacks ``fleet`` and its count. Version 2 lacks the trail: its counts, ``corner`` and
-``trail``. Version 1 lacks the floor: the fourth count, ``floor`` and ``swept``.
+Versions 1 to 4 are read, too. Version 4 lacks ``angle``; it is written if the cells are aligned
+with the axes of the map frame. Version 3 also lacks ``fleet`` and its count; it is written if there
+is no fleet, either. Version 2 also lacks the trail: its counts, ``corner`` and ``trail``. Version 1
+also lacks the floor: the fourth count, ``floor`` and ``swept``.
 """
 
 from __future__ import annotations
@@ -69,18 +69,18 @@ MOST_BYTES = (
     + MAX_LATTICE_CELLS * _TRAIL_BYTES
     + 16_000_000
 )
-"""Limit on the bytes of a body, and of a file, which is smaller; longer ones are not read."""
+"""Limit on the bytes of a body, and of a file; longer files are not read."""
 # Largest angle of the cells, which are symmetric under a quarter-turn [deg].
 MOST_LATTICE_DEG = 90.0
 # Pheromone values rounded at a time.
 _AT_ONCE = 1 << 18
-# The fastest level: it packs the bytes, mostly zeros and ones, to a hundredth.
+# The fastest level of zlib packs the bytes, mostly zeros and ones, to a hundredth of their size.
 _LEVEL = 1
 
 
 def encode_ledger(snapshot: LedgerSnapshot) -> bytes:
     """Return a ledger encoded as a file."""
-    # Part by part: a large ledger is not copied in memory as a whole.
+    # Encoded part by part, so that a large ledger is not copied as a whole.
     deflater = zlib.compressobj(_LEVEL)
     body = b"".join([*map(deflater.compress, _parts(snapshot)), deflater.flush()])
     version = _version_of(snapshot)
@@ -123,12 +123,12 @@ def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
 
     Args:
         payload: the bytes.
-        cell_m: configured edge of a cell [m]; a ledger of other cells is accepted if it has swept
-            floor. None accepts any.
+        cell_m: configured edge of a cell [m]; a ledger with other cells is accepted if it has swept
+            floor. None accepts any cells.
 
     Raises:
         LedgerFileError: the bytes are damaged.
-        LedgerMismatchError: it has another version, or other cells and no floor.
+        LedgerMismatchError: the ledger has another version, or other cells and no floor.
     """
     if len(payload) < _ENVELOPE.size:
         raise LedgerFileError(f"torn: {len(payload)} bytes")
@@ -165,7 +165,7 @@ def _inflated(body: bytes) -> bytes:
     if inflater.unconsumed_tail:
         raise ValueError(f"over {MOST_BYTES} bytes")
     if not inflater.eof or inflater.unused_data:
-        raise ValueError("no whole stream")
+        raise ValueError("the compressed data is incomplete")
     return plain
 
 
@@ -178,9 +178,9 @@ def _decode_body(plain: bytes, version: int) -> LedgerSnapshot:
     )[:8]
     for count, most in ((tile_count, MOST_TILES), (floor_count, MOST_FLOOR_TILES)):
         if count > most:
-            raise ValueError(f"{count} tiles, {most} are read at most")
+            raise ValueError(f"{count} tiles, at most {most} are read")
     if rows * cols > MAX_LATTICE_CELLS:
-        raise ValueError(f"trail of {rows} x {cols} cells, {MAX_LATTICE_CELLS} are read at most")
+        raise ValueError(f"trail of {rows} x {cols} cells, at most {MAX_LATTICE_CELLS} are read")
     frame_end = head.size + frame_bytes
     cells_end = frame_end + _PLACE_BYTES * cell_count
     tiles_end = cells_end + (_PLACE_BYTES + _TILE_BYTES) * tile_count

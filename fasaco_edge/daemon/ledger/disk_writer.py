@@ -1,4 +1,4 @@
-"""The disk writer: a thread that writes what changes, so that a slow disk delays no caller."""
+"""The disk writer: a thread that writes changes to disk, so that a slow disk delays no caller."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LOG = logging.getLogger(__name__)
 RETRY_S = 2.0
 # Longest time that a command's reply waits for a slow disk [s].
 MOST_WAIT_S = 1.0
-# Duration of a write above which a disk hangs [s]; memory cards pause for some seconds.
+# A disk hangs if a write takes longer than this [s]; memory cards pause for some seconds.
 HANGS_S = 10.0
 
 Item = TypeVar("Item")
@@ -31,11 +31,11 @@ class DiskWriter(Generic[Item]):
         name: name of the items, for logs.
         write: writes an item; raises any error.
         fault_of: returns an error as a fault that says what to do.
-        merge: joins an item that is not written yet with the next one; by default returns the next
-            one.
+        merge: joins an item that is not written yet with the next item; by default, the next item
+            replaces it.
 
     Attributes:
-        trouble: the present reason not to write; "" for none.
+        trouble: why the newest write failed; "" if it succeeded.
     """
 
     def __init__(
@@ -67,14 +67,14 @@ class DiskWriter(Generic[Item]):
             self._thread.start()
 
     def _wait(self, item: Item, *, is_older: bool = False) -> None:
-        """Let an item wait, merged with one that waits already; the caller holds the lock."""
+        """Queue an item, merged with an item that waits already; the caller holds the lock."""
         if self._waiting is not None:
             pair = (item, self._waiting) if is_older else (self._waiting, item)
             item = self._merge(*pair)
         self._waiting = item
 
     def is_behind(self) -> bool:
-        """Return whether a write is still due and not prevented."""
+        """Return whether a write is still due, and the newest write did not fail."""
         with self._changed:
             is_due = self._waiting is not None or self._writes_since is not None
             return is_due and not self.trouble

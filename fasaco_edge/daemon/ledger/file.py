@@ -1,10 +1,10 @@
 """A robot's ledger on disk: two generations, each complete or absent.
 
-``<robot>.ledger`` is the newest ledger, ``<robot>.ledger.previous`` the one before. A new ledger is
-written to ``<robot>.ledger.new`` and fsynced, and then the files are renamed: at every moment one
-of them is complete, and ``load`` finds the newest. Unusable files are set aside under a name that
-contains the reason. Of each kind the newest few and the largest are kept, except files without
-covered cell and swept floor.
+``<robot>.ledger`` is the newest ledger, ``<robot>.ledger.previous`` its predecessor. A new ledger
+is written to ``<robot>.ledger.new`` and fsynced, and then the files are renamed: at every moment
+one of them is complete, and ``load`` finds the newest. Unusable files are set aside under a name
+that contains the reason. For each reason the newest few files and the largest file are kept, except
+files without covered cells and swept floor.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fasaco_edge.host.durable import make_folder, sync_folder, write_through
 from fasaco_edge.host.files import FileTooLongError, open_own, read_own
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
-# Number of renamed files of each kind that are kept, besides the largest.
+# Number of files set aside for one reason that are kept, besides the largest.
 KEPT_ASIDE = 3
 
 
@@ -47,16 +47,16 @@ def lock_file(folder: Path, robot: str) -> Path:
 
 
 def why_no_lock(name: Path) -> str:
-    """Return what blocks the path of the lock file, "" for nothing.
+    """Return what lies in place of the lock file, "" for nothing.
 
-    Nothing is set aside here, as a link of another user must not receive our ledger.
+    It is not set aside: a ledger must not be written to where another user's link leads.
     """
     kind = "a link" if name.is_symlink() else "a folder" if name.is_dir() else ""
     return f"{kind} lies in place of {name}" if kind else ""
 
 
 class LedgerFile:
-    """The files of one robot in a folder; made for one process at a time.
+    """The files of one robot in a folder; only one process may use them at a time.
 
     Attributes:
         path: the newest generation.
@@ -98,8 +98,8 @@ class LedgerFile:
                 fault = self._after_aside(error, self._generations, "mismatch")
                 return LoadedLedger(fault=fault, note=note)
             except (OSError, LedgerFileError) as error:
-                # An interrupted write is no fault: the previous ledger is intact. A file that the
-                # disk fails to read may be complete.
+                # An interrupted write is no fault: the previous ledger is intact. But a file that
+                # the disk fails to read may be complete.
                 if path != self._new or (isinstance(error, OSError) and os.path.lexists(path)):
                     broken[path] = reason_of(error)
                 continue
@@ -144,7 +144,7 @@ class LedgerFile:
         return kept
 
     def set_aside(self, why: str) -> list[str]:
-        """Rename existing files, with the word ``why`` in their new names; return these.
+        """Rename the existing files to names that contain ``why``; return the new names.
 
         Raises:
             OSError: renaming failed; it is retried before the next write.
@@ -155,7 +155,7 @@ class LedgerFile:
     def _take_lock(self) -> None:
         make_folder(self.path.parent)
         # The file is not opened for writing: that would keep the disk from turning read-only.
-        # Non-blocking: if its name is a pipe, opening it would wait for a writer.
+        # Non-blocking: opening a pipe of this name would wait for a writer.
         name = lock_file(self.path.parent, self.path.stem)
         try:
             lock = open_own(name, os.O_RDONLY | os.O_NONBLOCK)
@@ -176,7 +176,7 @@ class LedgerFile:
         self._lock = lock
 
     def _taken(self, path: Path, broken: dict[Path, str]) -> FasacoError | None:
-        """Make the ledger that was read the newest; return the earlier fault."""
+        """Make the file that was read the newest ledger; return the fault of the others, if any."""
         if path == self._new:
             self._moving = True
             try:
@@ -218,9 +218,9 @@ class LedgerFile:
         return kept[::-1]
 
     def _move_on(self) -> None:
-        """Rename the newest generation to the previous, then the new one to the newest.
+        """Rename the newest file to the previous, then the new file to the newest.
 
-        After a crash in between, the new one is found under its own name.
+        After a crash in between, ``load`` finds the new file under its own name.
         """
         if self.path.exists():
             os.replace(self.path, self._previous)
@@ -267,7 +267,7 @@ def _is_empty(path: Path) -> bool:
 
 
 def _prune(path: Path, why: str, newest: Path) -> None:
-    """Delete kept files of the same kind, except the newest few and the largest."""
+    """Delete files set aside for the reason ``why``, except the newest few and the largest."""
     older = [other for other in _aside(path, why).values() if other != newest]
     largest = max([*older, newest], key=lambda other: other.stat().st_size)
     for other in older[: 1 - KEPT_ASIDE]:
@@ -283,7 +283,7 @@ def _free_name(path: Path, why: str) -> Path:
 
 
 def _aside(path: Path, why: str) -> dict[tuple[int, str, str], Path]:
-    """Return the kept files of one kind by number, time and name, oldest first."""
+    """Return the files set aside for one reason by number, time and name, oldest first."""
     form = re.compile(re.escape(f"{path.name}.{why}-") + r"(\w+Z)(?:-(\d+))?")
     found = {
         (int(match[2] or 1), match[1], other.name): other

@@ -51,8 +51,8 @@ from fasaco_edge.mission.rooms.room_book import (
 from fasaco_edge.mission.rooms.room_raster import MOST_SQUARES, RoomRaster
 
 MOST_BYTES = 16_000_000
-"""Limit on the bytes of a file; longer ones are not read."""
-MOST_OUTLINE = 1000
+"""Limit on the bytes of a file; longer files are not read."""
+MOST_CORNERS = 1000
 _LEVEL = 1
 
 _Number = Annotated[int, Meta(ge=1, le=MOST_NUMBER)]
@@ -84,7 +84,7 @@ class RoomNote(_Note, frozen=True, omit_defaults=True):
     passes: Passes | None = None
     skip: bool = False
     priority: Priority = USUAL_PRIORITY
-    outline: Annotated[list[_Corner], Meta(max_length=MOST_OUTLINE)] = []
+    outline: Annotated[list[_Corner], Meta(max_length=MOST_CORNERS)] = []
     area_m2: Annotated[float, Meta(ge=0)] = 0.0
     neighbours: Annotated[list[_Number], Meta(max_length=MOST_ROOMS)] = []
     encloses: Annotated[list[_Number], Meta(max_length=MOST_ROOMS)] = []
@@ -252,7 +252,7 @@ class RoomsFile:
     def __init__(self, folder: Path, robot: str) -> None:
         self.path = folder / f"{robot}.rooms.json"
         self._new = folder / f"{robot}.rooms.json.new"
-        # Why a file that was not read is set aside before the first write; "" for none.
+        # Why an unread file is to be set aside before the first write; "" for no such file.
         self._unwanted = ""
 
     def load(self) -> tuple[bytes, RoomBook, RoomsFileError | None]:
@@ -281,7 +281,7 @@ class RoomsFile:
         make_folder(self.path.parent)
         if self._unwanted and os.path.lexists(self.path):
             kept = self._set_aside()
-            LOG.warning("the file of rooms before is kept as %s", kept)
+            LOG.warning("the previous file of rooms is kept as %s", kept)
         self._unwanted = ""
         try:
             write_through(self._new, payload)
@@ -306,7 +306,7 @@ class RoomsKeeper:
 
     Attributes:
         book: the rooms.
-        restored: the bytes of the file that the daemon began with; b"" for none.
+        restored: the file's bytes when the daemon began; b"" for none.
     """
 
     def __init__(self, file: RoomsFile) -> None:

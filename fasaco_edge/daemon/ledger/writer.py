@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# Period of writes [s]: coverage is on disk within a second, with a cycle of up to 0.1 s and some
-# tenths for a memory card.
+# Period of writes [s]. With a cycle of up to 0.1 s and some tenths for a memory card, coverage is
+# on disk within a second.
 PERIOD_S = 0.5
-# Period if only floor and trail have changed, as every pose or path changes them [s]: memory cards
+# Period if only floor and trail have changed [s]: each pose or path changes them, and memory cards
 # wear out.
 FLOOR_PERIOD_S = 1.0
 # Period if only time was spent, as in a dock [s].
@@ -41,7 +41,7 @@ SPENT_PERIOD_S = 30.0
 
 
 class _Kept(NamedTuple):
-    """The state last passed to the writer; ``spent``: time of the order, in SPENT_PERIOD_S."""
+    """The state last passed to the writer; ``spent``: time of the order in SPENT_PERIOD_S units."""
 
     visits: int
     floor_changes: int
@@ -61,7 +61,7 @@ class LedgerKeeper:
     """Keeps coverage and order in the ledger; also before there is a mission.
 
     Attributes:
-        order_state: the order to begin with: the one from before the restart, if any.
+        order_state: the order to begin with; after a restart, the order from before.
     """
 
     def __init__(self, writer: LedgerWriter, cell_m: float, *, autostart: bool) -> None:
@@ -122,7 +122,7 @@ class LedgerKeeper:
                 self._begin_anew(fault, "mismatch")
 
     def check_loss(self, command: str) -> None:
-        """Check that a command forgets no covered cell; all count, as zones need a map.
+        """Check that a command forgets no covered cell, inside the zones or outside.
 
         Raises:
             WouldForget: there is a loss; the text gives its size.
@@ -159,7 +159,7 @@ class LedgerKeeper:
 
 
 def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False) -> LedgerWriter:
-    """Load a robot's ledger and start its writer thread; ``fresh``: set aside what there is.
+    """Load a robot's ledger and start its writer thread; ``fresh``: set the old files aside.
 
     Raises:
         LedgerFileError: another process writes this ledger.
@@ -180,7 +180,7 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
 
 
 def _continued(file: LedgerFile, found: LoadedLedger, cell_m: float) -> LedgerWriter:
-    """Continue a ledger; if it is set aside, start one with the operator's keep-outs alone."""
+    """Continue a ledger; if it is set aside, start a new one with the operator's keep-outs."""
     keep_outs: KeepOuts = ()
     with suppress(OrderError):
         keep_outs = OrderState.from_json(found.note).keep_out if found.note else ()
@@ -258,7 +258,7 @@ class LedgerWriter:
             kept += self._file.write(pending.ledger)
             self._written_at = time.monotonic()
         if kept:
-            LOG.warning("the ledger before is kept as %s", ", ".join(kept))
+            LOG.warning("the previous ledger is kept as %s", ", ".join(kept))
 
 
 class NoDisk(LedgerWriter):

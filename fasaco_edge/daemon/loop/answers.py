@@ -47,7 +47,6 @@ _NO_WILDCARD = "ask by the whole key, without *"
 
 
 def error_reply(error: FasacoError) -> QueryReply:
-    """Return an error as a reply."""
     return QueryReply(encode_error(error), is_error=True)
 
 

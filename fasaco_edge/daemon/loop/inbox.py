@@ -54,7 +54,7 @@ ASK_FOR_MAP_S = 2.0
 # Least period of maps, shorter than any mapper's: a flood of maps must not take a core [s].
 MAP_SPACING_S = 0.05
 # Limit on the poses of a cycle, as other samples must not wait for a thousand poses. A command
-# waits for all earlier poses, as floor swept before a reset must not count after it.
+# waits for all earlier poses: floor swept before a reset must not count after the reset.
 MOST_POSES = 32
 # Limit on the commands of a cycle, as an order of a hundred zones takes as long as a map.
 MOST_COMMANDS = 1
@@ -126,7 +126,8 @@ def make_mailbox(
     """Return the mailbox of a daemon; a replay, with another clock, sets no rate limits.
 
     Poses are queued for some seconds, as each adds to the swept floor. A map does not replace the
-    previous map, as it may be malformed. An update waits with the map that it changes.
+    previous map in the queue, as the new one may be malformed. An update waits with the map that it
+    changes.
     """
     spacing = Spacing("map", map_spacing_s, followers=("map_update",))
     bounds = queues(max_pixels)
@@ -147,7 +148,7 @@ def _size_of(item: object) -> int:
 
 
 def poster(mailbox: Mailbox[object], kind: str, max_pixels: int) -> Callable[[Sample], None]:
-    """Return a callback that posts a kind of samples, on a Zenoh thread; drops oversized ones."""
+    """Return a callback that posts samples of a kind on a Zenoh thread; drops oversized samples."""
     most = most_bytes(kind, max_pixels)
 
     def post(sample: Sample) -> None:
@@ -168,10 +169,10 @@ class Inbox:
         poses: decodes poses.
         max_pixels: largest map or update [pixels].
         maps: further subscriptions that deliver maps.
-        fleet: receives messages of a fleet's other robots; None without one.
+        fleet: receives messages of a fleet's other robots; None without a fleet.
 
     Attributes:
-        refused: kinds of samples whose newest one was refused, and why.
+        refused: why the newest sample of a kind was refused, by kind.
     """
 
     def __init__(
@@ -260,7 +261,7 @@ class Inbox:
             self.refused.pop(received.kind, None)
             if isinstance(event, PatchReceived):
                 if received.at < map_at.get(event.patch.frame, float("-inf")):
-                    lost = 0  # lost updates were even older
+                    lost = 0  # lost updates were older than the map
                     continue
                 if lost:
                     events.append(PatchesLost(lost))
@@ -331,8 +332,8 @@ def blocked_of(payload: bytes) -> FollowerBlocked:
 def _bare(error: FasacoError) -> FasacoError:
     """Return the error without its traceback.
 
-    The traceback would keep the payload until garbage collection, which a flood of malformed maps
-    turns into gigabytes.
+    The traceback would keep the payload until garbage collection: gigabytes in a flood of malformed
+    maps.
     """
     return error.with_traceback(None)
 
@@ -344,4 +345,4 @@ def _size_fault(dropped: Oversized) -> FasacoError:
     if dropped.kind in MAPS:
         hint = "publish the map with larger pixels, or raise map.max_pixels"
         return MapTooLarge(text, hint=hint)
-    return MalformedMessage(text, hint="publish no larger message; another type may be sent there")
+    return MalformedMessage(text, hint="publish smaller messages; is another type sent there?")

@@ -92,7 +92,6 @@ def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConf
     """Return the configuration of a daemon's mission that ``chosen`` plans for."""
     from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
     from fasaco_edge.planners.living_trail import TrailRules  # noqa: PLC0415
-    from fasaco_edge.planners.paper.fasaco import Fasaco  # noqa: PLC0415
     from fasaco_edge.planners.search.near_optimal import NearOptimal  # noqa: PLC0415
 
     robot, maps, planner, cell_m = config.robot, config.map, config.planner, config.cell_m
@@ -104,9 +103,8 @@ def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConf
         planner.spare_share if isinstance(chosen, NearOptimal) else 0.0,
         _sweeping(config),
         TrailRules(planner.alpha, planner.tau0),
-        isinstance(chosen, Fasaco),
-        config.battery or None,
-        config.lattice_deg,
+        battery=config.battery or None,
+        lattice_deg=config.lattice_deg,
         speed_m_s=robot.speed_m_s,
     )
 
@@ -117,7 +115,8 @@ def _sweeping(config: DaemonConfig) -> Sweeping | None:
     robot, line = config.robot, LINES.get(config.planner.line)
     if line is None:
         return None
-    line = replace(line, speed_m_s=robot.speed_m_s, turning=robot.turning())
+    speed_m_s, turning = robot.speed_m_s, robot.turning()
+    line = replace(line, speed_m_s=speed_m_s, turning=turning, swept=config.planner.swept)
     most_pixels = floor_pixels(config.map.max_pixels)
     return Sweeping(
         robot.tool_width_m,

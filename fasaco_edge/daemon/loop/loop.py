@@ -215,7 +215,7 @@ class Loop:
             self._periodic["fleet"] = fleet
 
     def _count_faults(self, faults: Sequence[FasacoError]) -> None:
-        """Count faults; query the map that updates lack."""
+        """Count faults; query the map if updates arrived without it."""
         self._status.faults.count(faults)
         if any(isinstance(fault, PatchWithoutBase) for fault in faults):
             self._ports.inbox.ask_for_map(time.monotonic())
@@ -226,7 +226,7 @@ class Loop:
         return self._ports.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
 
     def _note(self, batch: CycleInput) -> None:
-        """Take the times of plans and maps."""
+        """Note the times of plans and maps."""
         mission = self._runner.mission
         for plan in batch.plans:
             if isinstance(plan, PlanReady) and not (

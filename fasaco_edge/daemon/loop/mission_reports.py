@@ -151,7 +151,6 @@ def _largest_first(*parts: tuple[float, str]) -> tuple[FloorLeft, ...]:
 
 
 def plan_counts(mission: Mission | None) -> PlanCounts:
-    """Return the counts of plans."""
     if mission is None:
         return PlanCounts()
     route = mission.route
@@ -265,7 +264,7 @@ def zone_progress(mission: Mission) -> list[ZoneProgress]:
 
 
 def ahead_s(mission: Mission) -> float:
-    """Return the time of the path ahead [s]: of its line, or of its walk where cells are driven."""
+    """Return the time of the path ahead [s]: of its line, or without a line of its walk."""
     line = mission.line.ahead()
     if line is None:
         return mission.orders.scope.walk_s(mission.route.path.ahead)

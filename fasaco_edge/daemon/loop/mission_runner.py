@@ -73,7 +73,7 @@ class MissionRunner:
         self._load = load or Loader
         self._loader: Loader | None = None
         self._held = HeldEvents()
-        # The mission that the next one replaces.
+        # The mission that the next mission replaces.
         self._before: Mission | None = None
 
     @property
@@ -97,9 +97,9 @@ class MissionRunner:
     def mission_for(
         self, events: list[Event], claim: ClaimState
     ) -> tuple[Mission | None, list[Event], list[FasacoError]]:
-        """Return the mission once it is loaded and this daemon plans, its events, and faults.
+        """Return the mission, its events, and the faults of unusable events.
 
-        Until then events are held; a new mission gets all of them. Faults are of unusable events.
+        Until it is loaded and this daemon plans, the mission is None, and events are held for it.
         """
         if self.mission is not None:
             return self.mission, events, []
@@ -116,7 +116,7 @@ class MissionRunner:
                 self.mission.continue_from(self._before)
             self._before = None
             if self.config.fleet:
-                # Sets the order apart from orders of ledgers that were set aside.
+                # Distinguishes the order from orders in ledgers that were set aside.
                 self.mission.covered.shared.begin_epoch(time.time_ns() // 1_000_000)
             self._held = HeldEvents()
         return self.mission, held, faults
@@ -195,7 +195,6 @@ class MissionRunner:
             self._before = None
 
     def submit(self, request: PlanRequest) -> None:
-        """Submit a plan request."""
         assert self.worker is not None
         self.worker.submit(request)
 
@@ -210,7 +209,7 @@ class MissionRunner:
             self.worker.close(timeout_s)
 
 
-_LOST = (PatchesLost, "")
+_LOST_KEY = (PatchesLost, "")
 
 
 class HeldEvents:
@@ -233,7 +232,6 @@ class HeldEvents:
 
     @property
     def has_map(self) -> bool:
-        """Whether there is a map."""
         return any(kind is MapReceived for kind, _ in self._held)
 
     def take(self, events: Sequence[Event]) -> list[FasacoError]:
@@ -242,7 +240,7 @@ class HeldEvents:
         for event in in_runs(events):
             match event:
                 case MapReceived():
-                    self._held.pop(_LOST, None)
+                    self._held.pop(_LOST_KEY, None)
                     self._hold(event)
                 case PoseReceived() | BatteryReceived() | PriorityReceived():
                     self._hold(event)
@@ -251,11 +249,11 @@ class HeldEvents:
                 case PatchesLost(count):
                     faults.append(PatchWithoutBase(f"{count} map updates were lost"))
                     if self.has_map:
-                        self._held.setdefault(_LOST, event)
+                        self._held.setdefault(_LOST_KEY, event)
         return faults
 
     def _hold(self, event: Event) -> None:
-        """Hold an event in place of others of its type, except the newest in another frame."""
+        """Hold an event in place of others of its type, but keep the newest of another frame."""
         frame = _frame(event)
         before = [other for kind, other in self._held if kind is type(event)]
         kept = [other for other in before if other not in ("", frame)][-1:]
@@ -271,7 +269,7 @@ class HeldEvents:
             for held in self._held.values()
             if isinstance(held, MapReceived)
         }
-        if not maps or _LOST in self._held:
+        if not maps or _LOST_KEY in self._held:
             return without_base(patches, updates_lost=bool(maps))
         faults: list[FasacoError] = []
         newest = next(reversed(maps))

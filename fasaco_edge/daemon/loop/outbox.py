@@ -150,7 +150,6 @@ def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def path_attachment(path: PublishedPath) -> PathAttachment:
-    """Return the attachment of a path."""
     changed = path.changed and Rectangle(*(round(edge, 3) for edge in path.changed))
     return structs.replace(
         PathAttachment.of(path.plan),

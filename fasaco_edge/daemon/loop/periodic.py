@@ -55,7 +55,7 @@ class Due:
     """Decides when a message is due: on change of a key or as a repetition, with a least period.
 
     Attributes:
-        next_at: earliest time of the next one [s, monotonic].
+        next_at: earliest time of the next message [s, monotonic].
     """
 
     def __init__(self) -> None:
@@ -63,16 +63,16 @@ class Due:
         self._key: tuple[object, ...] = ()
 
     def is_due(self, key: tuple[object, ...], now: float, *, repeats: bool) -> bool:
-        """Return whether it is due now; ``repeats``: also as a repetition."""
+        """Return whether the message is due now; ``repeats``: also as a repetition."""
         is_new = key != self._key or (repeats and now - self._at >= REPEAT_S)
         return is_new and now >= self.next_at
 
     def note(self, key: tuple[object, ...], now: float, period_s: float) -> None:
-        """Note that it is published; the next one is due ``period_s`` [s] later at the earliest."""
+        """Note a publication at ``now``; the next is due ``period_s`` [s] later at the earliest."""
         self._key, self._at, self.next_at = key, now, now + period_s
 
     def forget(self) -> None:
-        """Publish the next one even if the key has not changed."""
+        """Publish the next message even if the key has not changed."""
         self._key = ()
 
 
@@ -83,7 +83,6 @@ class CoveragePublisher:
         self._outbox, self._due = outbox, Due()
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish the coverage if that is due."""
         # An order may reset the coverage, and add keep-out cells.
         key = (mission.covered.version, mission.map.map_revision, mission.order_state)
         lattice, grid = mission.lattice, mission.grid
@@ -103,7 +102,6 @@ class FloorPublisher:
         self._outbox, self._due = outbox, Due()
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish the swept floor if that is due."""
         if not self._outbox.has_listeners(FLOOR):
             self._due.forget()  # the next listener has not received it
             return
@@ -125,7 +123,6 @@ class UnsweptPublisher:
         self._outbox, self._due = outbox, Due()
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish the unswept floor if that is due."""
         if not self._outbox.has_listeners(UNSWEPT):
             self._due.forget()  # the next listener has not received it
             return
@@ -147,7 +144,6 @@ class TrailPublisher:
         self._outbox, self._due = outbox, Due()
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish or keep the trail if due."""
         is_wanted = any(map(self._outbox.has_listeners, (PHEROMONE, DIRECTIONS)))
         trail, lattice, grid = mission.trail, mission.lattice, mission.grid
         key = (trail, trail.changes, is_wanted)
@@ -230,7 +226,7 @@ OF_MISSION: dict[str, Callable[[Outbox], PeriodicMessage]] = {
     "unswept": UnsweptPublisher,
     "pheromone": TrailPublisher,
 }
-"""The publishers of a mission's messages, by the name that the log gives their failures."""
+"""The publishers of a mission's messages, by their names in log lines about failures."""
 
 
 class RoomsPublisher:
@@ -245,14 +241,13 @@ class RoomsPublisher:
         self._shares = RoomShares()
 
     def publish(self, mission: Mission | None, now: float) -> None:
-        """Publish the rooms if that is due."""
         book, progress_id = self._book, None if mission is None else _progress_of(mission)
         # Another order may have forgotten the coverage of the previous order.
         order = None if mission is None else mission.order_state.order
         is_new = book.version != self._version or order is not self._order
         if not is_new and (progress_id == self._progress or not book.rooms):
             return
-        # At the end of an order shares are published sooner, as listeners may end with it.
+        # At the end of an order shares are published sooner, as listeners may leave then.
         is_over = mission is not None and mission.state.is_at_rest
         if now - self._published_at < (ROOMS_PERIOD_S if is_new or is_over else SWEPT_PERIOD_S):
             return
@@ -274,7 +269,7 @@ def _progress_of(mission: Mission) -> tuple[object, int, int, bool]:
 
 
 def _report(room: Room, progress: RoomProgress | None, share: float | None) -> RoomReport:
-    """Return the report of a room; ``share``: of its floor that is swept, None where not known."""
+    """Return the report of a room; ``share``: swept share of its floor, None if unknown."""
     settings = room.settings
     if share is None and progress is not None:
         share = progress.share

@@ -29,7 +29,7 @@ class RoomShares:
 
         The share is of the whole room, whatever the order asks for there. Rooms without such floor
         are left out; so are all rooms if only cells are counted, and in a fleet, as the floor that
-        others sweep is not known.
+        others sweep is unknown.
         """
         sheet, floor = mission.rooms.sheet, mission.line.floor_in_reach(MOST_SQUARES)
         if sheet is None or floor is None or mission.company.has_members:

@@ -71,7 +71,7 @@ class StatusBoard:
         claim: id of this daemon and whether it plans, as in the status.
         yield_reason: reason why another daemon plans instead; "" if this one plans.
         conflicts: texts on inputs with two publishers.
-        refused: kinds of samples whose newest one was refused, and why.
+        refused: why the newest sample of a kind was refused, by kind.
     """
 
     def __init__(self, config: DaemonConfig) -> None:
@@ -92,7 +92,7 @@ class StatusBoard:
         self._started = time.monotonic()
         self._sent_at = float("-inf")
         self._sent_key: tuple[object, ...] = ()
-        # Start of the time without a mission or its loading [s]; None while there is either.
+        # Since when there is neither a mission nor its loading [s]; else None.
         self._unbegun_at: float | None = None
         self._since: dict[str, float] = {}
 
@@ -183,13 +183,13 @@ class StatusBoard:
         return self._why("waiting for map", self.waits)
 
     def _why(self, lacks: str, text: str) -> str:
-        """Return why a state or trouble lasts, with what was wrong with the input it lacks."""
+        """Return why a state or trouble lasts; also why the newest input it lacks was refused."""
         kind = LACKING.get(lacks, "")
         why = self.refused.get(kind)
         return f"{text}; the newest {kind} was refused: {why}" if why else text
 
     def _troubles(self, runner: MissionRunner, now: float) -> tuple[TroubleReport, ...]:
-        """Return all troubles; only the mission's own ones make it degraded."""
+        """Return all troubles; only those of the mission itself make it degraded."""
         own = self._of_mission(runner, now)
         if self.yield_reason:
             return own

@@ -49,13 +49,13 @@ LOG = logging.getLogger(__name__)
 PERIOD_S = 0.5
 # Limit on the cycles in which the log waits for a recorder, which takes some seconds to start.
 WAITING_TURNS = 2048
-# Limits on the samples from before the first subscriber, which are embedded deflated: more would
-# delay the loop [bytes].
+# Limits on the embedded samples from before the first subscriber, as they are and deflated [bytes]:
+# more would delay the loop.
 EMBEDDED_BYTES, DEFLATED_BYTES = 8_000_000, 500_000
-# Longest pose or battery message that is embedded, not referred to by checksum; limit on them while
-# the log waits for a recorder [bytes].
+# Longest pose or battery message that is embedded instead of referred to by checksum; limit on all
+# of these together while the log waits for a recorder [bytes].
 POSE_BYTES, POSES_BYTES = 1024, 500_000
-# Longest map that is embedded, as a busy link may drop it; copying a longer one delays the loop
+# Longest map that is embedded, as a busy link may drop it; copying a longer map delays the loop
 # [bytes].
 MAP_BYTES = 100_000
 # Size from which a batch is published at once [bytes].
@@ -254,7 +254,7 @@ class DecisionFilter:
         self._state = ("", "")
 
     def of(self, decision: Decision, mission: Mission | None) -> Decided | None:
-        """Return the entry for the next cycle; None for none."""
+        """Return the entry for the next cycle; None without a decision or change of state."""
         state = (str(mission.state), mission.reason) if mission else ("", "")
         decided = decided_of(decision, *state)
         is_news = state != self._state or decided != Decided(*state)
@@ -284,5 +284,5 @@ def cells_checksum(cells: NDArray[np.int32]) -> int:
 
 
 def kernels_name() -> str:
-    """Return the name of the kernels in use; equal names compute the same."""
+    """Return the name of the kernels in use; kernels of one name compute the same."""
     return f"kernels-{sources_digest()}"

@@ -28,8 +28,8 @@ class PlanningWorker:
     """Plans one request at a time and posts the result.
 
     Attributes:
-        progress: counter of the thread's actions, which are stop checks of a search and waits for a
-            request; it stops only if the thread hangs.
+        progress: counts the stop checks of a search and the waits for a request; it stands still
+            only if the thread hangs.
     """
 
     def __init__(

@@ -32,7 +32,7 @@ from fasaco_edge.fleet.mission.traffic import (
 from fasaco_edge.grid.lattice import Cell, Footprint
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.company import Waiting
-from fasaco_edge.mission.events import Doing, PathUpdate, State
+from fasaco_edge.mission.events import Doing, PathUpdate
 from fasaco_edge.mission.line.way import sees_on
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.stay import Stay
@@ -40,6 +40,7 @@ from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.path.route import NO_CELLS, Route
 from fasaco_edge.mission.work.order_state import Stage
 from fasaco_edge.mission.work.sequencer import Sequencer
+from fasaco_edge.states import State
 
 # Largest gap between a robot that stands on its path and another robot that blocks it; least
 # displacement that counts as motion [m].
@@ -155,7 +156,7 @@ class GivingWay(Waiting):
             state = State.RETURNING
         elif state is not State.DONE and cell is not None:
             state = State.COVERING if order.is_open else State.DONE
-            if why := self._fleet.share(self._orders.cells.open_cells, cell, now):
+            if why := self._fleet.share(self._orders.cells.untried, cell, now):
                 self._route.requests.want(why)
         return Doing(state, self._reason, update)
 

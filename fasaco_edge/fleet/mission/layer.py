@@ -18,8 +18,6 @@ from fasaco_edge.fleet.mission.members import Members
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS
 from fasaco_edge.fleet.mission.shared_ground import viewpoint
 from fasaco_edge.fleet.mission.shared_work import DivisionNumbers, Remainder
-from fasaco_edge.grid.changes import carried
-from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell, Footprint
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.company import Company, OpenCells
@@ -57,7 +55,7 @@ class FleetLayer(Company):
         map_state: MapState,
         ledger: MissionLedger,
     ) -> None:
-        self.others = Members(robot, ledger, footprint.cell_m)
+        self.others = Members(ledger, footprint.cell_m)
         self._radius_m = footprint.robot_radius_m
         self.numbers = DivisionNumbers(robot, self.others)
         self._robot, self.step_s = robot, cost.step_s
@@ -70,11 +68,6 @@ class FleetLayer(Company):
         self._owners = None, np.zeros((0, 0), np.int8)
         # Joint area of the last check, kept because others send their ground many times a second.
         self._seen: tuple[ReachableArea, ReachableArea] | None = None
-        # Cells that this robot has given up while others are at work; cells of an area that it
-        # cannot reach, although another map may show a way.
-        self._tried = Window(0, 0, 0, 0), np.zeros((0, 0), np.bool_)
-        self._shut: tuple[ReachableArea | None, Mask]
-        self._shut = None, np.zeros((0, 0), np.bool_)
         # Number of own cells that others had swept at the last plan; version of the shared progress
         # at the last check.
         self._taken, self._counted = 0, 0
@@ -83,10 +76,6 @@ class FleetLayer(Company):
     def receive(self, event: MemberReceived, now: float) -> str:
         """Take in another robot's message; return why it requires a plan, or ""."""
         return self.others.receive(event, now)
-
-    def forget_ground(self) -> None:
-        """Forget the ground of others: it belongs to another map."""
-        self.others.ground.clear()
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return the part of an area reachable from ``cell`` around robots in the way."""
@@ -122,12 +111,9 @@ class FleetLayer(Company):
             yield at
 
     def _left(self, open_cells: OpenCells, area: ReachableArea) -> tuple[ReachableArea, Mask]:
-        """Return the joint area, and which of its cells are left and untried, bool (rows, cols)."""
+        """Return the joint area, and which of its cells are left, bool (rows, cols)."""
         joint = self._joint(area)
-        left = open_cells(joint.lattice.window) & joint.reachable
-        inside = area.lattice.window.slices_in(joint.lattice.window)
-        left[inside] = self.untried(left[inside], area)
-        return joint, left
+        return joint, open_cells(joint.lattice.window) & joint.reachable
 
     def _joint(self, area: ReachableArea) -> ReachableArea:
         """Return the joint area as of the last check."""
@@ -140,39 +126,13 @@ class FleetLayer(Company):
         """Whether only parts of other robots are left, and these robots make progress."""
         return self._division is not None and self._remainder.others_go_on
 
-    def mine(self, cells: Mask, area: ReachableArea, unvisited: Mask | None = None) -> Mask:
-        """Return the cells that this robot has to visit or, if ``unvisited`` is given, to sweep.
-
-        These are the cells of its part; or all, if no unvisited cell of its part is reachable and
-        the others make no progress. Visits to cells that it has given up are left to the others.
-        """
-        if self._division is None:
-            return cells
-        if unvisited is None:
-            cells = unvisited = self.untried(cells, area)
-        own = self._is_own(self._division, area)
-        goes_on = self.others_go_on or (self.untried(unvisited, area) & own & area.reachable).any()
-        return cells & own if goes_on else cells
-
-    def give_up(self, cells: Mask, area: ReachableArea) -> Mask | None:
-        """Leave this robot's part of cells to the others; see ``Company.give_up``."""
+    def part(self, left: Mask, area: ReachableArea) -> Mask | None:
+        """Return this robot's part of an area; None without a division. See ``Company.part``."""
         if self._division is None:
             return None
-        self._tried = area.lattice.window, self.mine(cells, area) | self._tried_on(area)
-        return self.untried(cells, area)
-
-    def pass_over(self, cells: Mask, area: ReachableArea) -> bool:
-        """Leave this robot's part of cells to the others; see ``Company.pass_over``."""
-        if self._division is None:
-            return False
-        mine = self.mine(cells, area)
-        self._shut = area, mine | (self._shut[1] if self._shut[0] is area else np.False_)
-        return bool(mine.any())
-
-    def try_again(self) -> None:
-        """Clear the list of cells given up."""
-        self._tried = Window(0, 0, 0, 0), np.zeros((0, 0), np.bool_)
-        self._shut = None, self._shut[1]
+        own = self._is_own(self._division, area)
+        goes_on = self.others_go_on or (left & own & area.reachable).any()
+        return own if goes_on else np.ones_like(own)
 
     def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
         """Divide the remaining area again if worthwhile, see ``Company.share``."""
@@ -271,14 +231,6 @@ class FleetLayer(Company):
         even_s = UNEVEN * cells.sum() / (1.0 / steps_s).sum() + UNEVEN_S
         is_uneven = (cells * steps_s).max() > even_s and now - self._divided_at >= EVEN_S
         return "parts have become uneven" if is_uneven else ""
-
-    def untried(self, cells: Mask, area: ReachableArea) -> Mask:
-        """Return the cells that this robot has not given up."""
-        cells = cells & ~self._tried_on(area)
-        return cells & ~self._shut[1] if self._shut[0] is area else cells
-
-    def _tried_on(self, area: ReachableArea) -> Mask:
-        return carried(self._tried[1], self._tried[0], area.lattice.window)
 
     def _is_own(self, division: Division, area: ReachableArea) -> Mask:
         joint = self._joint(area)

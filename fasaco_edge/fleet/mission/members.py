@@ -17,7 +17,8 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.events import MemberReceived, State
+from fasaco_edge.mission.events import MemberReceived
+from fasaco_edge.states import AT_WORK
 
 # Timeouts of a silent robot, and of a robot at work that does not move [s]; least motion [m].
 GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
@@ -27,7 +28,6 @@ LEFT_M = 0.2
 
 # ``Member.absence`` of a silent robot.
 GONE = "gone"
-AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
 
 
 @dataclass(slots=True)
@@ -69,19 +69,20 @@ class Member:
 
 
 class Members:
-    """Tracks the other robots; empty without a fleet.
+    """Tracks the other robots.
 
     Attributes:
         known: the others, by name.
         ground: the cells that the others can reach, except robots that are left out.
     """
 
-    def __init__(self, robot: str, ledger: MissionLedger, cell_m: float) -> None:
+    def __init__(self, ledger: MissionLedger, cell_m: float) -> None:
         self.known: dict[str, Member] = {}
         self.ground = SharedGround()
-        self._robot, self._ledger, self._cell_m = robot, ledger, cell_m
+        self._ledger, self._cell_m = ledger, cell_m
         # Places of robots that stand in the way [m], by name.
         self._avoided: dict[str, tuple[float, float]] = {}
+        self.shared.clears(self.ground.clear)
 
     def neighbours(self, now: float) -> dict[str, Neighbour]:
         """Return the other robots in this robot's frame, except silent robots.
@@ -176,8 +177,6 @@ class Members:
         Raises:
             FleetError: there is no room for its data.
         """
-        if not self._robot:
-            return ""
         before, frame = self.known.get(event.robot), self._ledger.current.frame
         left_out = event.misfit or self.shared.why_misplaced(frame)
         if not left_out and event.frame not in ("", frame):

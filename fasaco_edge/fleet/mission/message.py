@@ -11,7 +11,8 @@ from fasaco_edge.fleet.mission.kind import giving_way_of, layer_of
 from fasaco_edge.fleet.mission.shared_ground import GroundQueue
 from fasaco_edge.fleet.mission.tiles import SweptQueue
 from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.mission.events import MemberReceived, State
+from fasaco_edge.mission.events import MemberReceived
+from fasaco_edge.states import State
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
@@ -87,4 +88,4 @@ def waits_for(mission: Mission) -> str:
     stands = mission.doing is State.COVERING and len(mission.route.path.ahead) < 2
     if name or not (stands and orders.part.waits_for_others):
         return name
-    return layer_of(mission).busiest(orders.cells.open_cells)
+    return layer_of(mission).busiest(orders.cells.untried)

@@ -13,7 +13,7 @@ swept a cell, or swept it again in an epoch whose messages were all lost.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
@@ -85,6 +85,7 @@ class SharedProgress(OthersCells):
         self._known = None, np.zeros((0, 0), np.bool_)
         self._grown: set[Cell] = set()
         self._encoded: tuple[int, bytes] = 0, b""
+        self._clear_too: Callable[[], None] = lambda: None
 
     def begin_epoch(self, epoch: int) -> None:
         """Start an epoch unused by earlier ledgers of this robot, unless an epoch was restored."""
@@ -240,8 +241,13 @@ class SharedProgress(OthersCells):
     def _places(self) -> set[Cell]:
         return {place for member in self._robots.values() for place in member.tiles}
 
+    def clears(self, clear: Callable[[], None]) -> None:
+        """Set what else ``clear`` calls."""
+        self._clear_too = clear
+
     def clear(self) -> None:
         """Forget all reports: they belong to another frame or building."""
+        self._clear_too()
         if self._robots:
             self._robots.clear()
             self._note_lost()

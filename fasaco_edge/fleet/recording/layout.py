@@ -19,6 +19,7 @@ from fasaco_edge.recording.scene.blueprint import (
     plot_view,
     up_to_cursor,
 )
+from fasaco_edge.recording.scene.curves import Plot
 from fasaco_edge.recording.scene.runcard import markdown_cell
 from fasaco_edge.recording.sdk import rrb
 
@@ -38,8 +39,7 @@ def build_layout(robots: Sequence[str], bounds: Bounds) -> rrb.Blueprint:
         return [f"/{robot_entity(robot, name)}" for robot in robots]
 
     def plot(title: str, name: str, *, top: float = 0.0) -> rrb.TimeSeriesView:
-        legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-        return plot_view(title, "", legend, top, contents=each(f"metrics/{name}"))
+        return plot_view(Plot(title, rrb.Corner2D.LeftTop, top), each(f"metrics/{name}"))
 
     trails = {robot_entity(robot, "world/trail"): up_to_cursor(TRAIL_S) for robot in robots}
     worlds = [f"{world}/**" for world in each("world")]

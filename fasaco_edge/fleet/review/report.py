@@ -10,7 +10,7 @@ recorder's clock decides which robot was first on a cell.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -31,8 +31,8 @@ from fasaco_edge.fleet.observer.cells import (
 from fasaco_edge.fleet.recording.notes import Note, read_notes
 from fasaco_edge.fleet.review.tracks import RobotTrack, seat_of, seconds_of, tracks_of
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.states import AT_WORK
 
-AT_WORK = ("planning", "covering", "degraded")
 # Time over which the highest rate of messages is averaged [s].
 PEAK_S = 5.0
 # Notes come once a second: a longer interval means that no message arrived [s].
@@ -217,7 +217,7 @@ def _figures(fleet: str, tracks: Sequence[RobotTrack], seat: Seat) -> FleetFigur
     )
 
 
-def _until_last(tracks: Sequence[RobotTrack], states: Sequence[str] = ()) -> float:
+def _until_last(tracks: Sequence[RobotTrack], states: Collection[str] = ()) -> float:
     """Return the time from the beginning, or the first note in ``states``, to the last note [s].
 
     Times are by the clock of the robot with the last note.

@@ -82,16 +82,17 @@ class FleetPage:
     def __init__(self, console: Console) -> None:
         self._blocks = ScreenBlocks(console)
 
-    def lines(self, view: FleetView, now: float, width: int, height: int) -> list[str]:
+    def lines(self, view: FleetView, now: float, width: int, height: int, *keys: str) -> list[str]:
         """Return ``height`` lines, each ``width`` characters wide.
 
         Args:
             view: what to show.
             now: time since the epoch [s].
             width, height: size of the screen, each at least 1 [characters].
+            keys: hints for the headline, if they fit.
         """
         blocks, robots, layout = self._blocks, view.robots(now), Layout.of(width, height)
-        page = blocks.block(headline(view, robots, now, width), width, 1)
+        page = blocks.block(headline(view, robots, now, width, *keys), width, 1)
         # A fleet's page has no legend: the table gets its line.
         room = min(layout.lines + 1, height - 1)
         totals = total_rows(view.floor, view.unheard(now), width, blocks.glyphs)
@@ -105,7 +106,9 @@ class FleetPage:
         return page + [" " * width] * (height - len(page))
 
 
-def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: int) -> Text:
+def headline(
+    view: FleetView, robots: Sequence[FleetRobot], now: float, width: int, *keys: str
+) -> Text:
     """Return a line that sums up the fleet's activity, for a width [characters]."""
     line = Text().append(f" {short(view.fleet)} ", "bold reverse").append("  ")
     present = [robot for robot in robots if robot.silent_s is None]
@@ -124,7 +127,7 @@ def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: i
         line.append(f"{at_work} of {len(robots)} robots at work", "bold green" if at_work else "")
         if view.floor.fraction is not None:
             line.append(f"  {percent(view.floor.fraction)} of cells")
-    return with_keys(line, width, "q quits", clock(now))
+    return with_keys(line, width, *keys, clock(now))
 
 
 # Largest size of all waiting samples [bytes]; a robot gets at most a quarter of it.
@@ -227,8 +230,8 @@ class FleetWatch(Watched):
         share = "" if fraction is None else f"{percent(fraction)} of cells  "
         return f"{share}{', '.join(f'{robot.name}: {robot.doing}' for robot in robots)}"
 
-    def page(self, now: float, width: int, height: int) -> list[str]:
-        return self._page.lines(self.view, now, width, height)
+    def page(self, now: float, width: int, height: int, *keys: str) -> list[str]:
+        return self._page.lines(self.view, now, width, height, *keys)
 
     def is_known(self) -> bool:
         """Return whether a message of a robot has arrived."""

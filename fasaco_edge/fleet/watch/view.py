@@ -8,11 +8,12 @@ from collections import Counter
 from dataclasses import dataclass
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.client.phrases import BAD, GOOD, PLAIN, TROUBLED, EventLog
+from fasaco_edge.client.phrases import BAD, GOOD, PLAIN, EventLog
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.fleet.observer.observed import JOINED, MOST_MEMBERS, ObservedFleet, ObservedRobot
 from fasaco_edge.fleet.observer.queues import RobotSample
 from fasaco_edge.fleet.observer.survey import Survey, survey_of
+from fasaco_edge.states import TROUBLED, Activity, states_of
 from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
 from fasaco_edge.wire.documents.json_text import decode_tolerant
@@ -29,7 +30,7 @@ RECENT_S = 600.0
 # Number of robots and topics whose faults are counted separately; number of other fleets named.
 MOST_FAULTS, MOST_FLEETS = 256, 32
 # States of a robot that does something for its mission.
-AT_WORK = ("planning", "covering", "returning", "degraded")
+AT_WORK = states_of(Activity.DRIVING)
 # Longest text of a robot that shares a line with other texts [characters].
 LONGEST = 40
 

@@ -1,9 +1,9 @@
 """Walks by fixed rules: sweeps, and spanning-tree coverage on any grid.
 
-Sweeps are what the paper's authors ran as Spiral-STC and ZigZag: a spiral that keeps
-turning to one side, and a sweep that tries the same directions in the same order at
-every cell; a dead end is left to the nearest open cell. Neither is Gabriely and Rimon's
-spanning-tree construction.
+The two sweeps are those that Carr and Wang (2022) ran as Spiral-STC and ZigZag: a spiral keeps
+turning to one side; a zigzag tries the same directions in the same order at every cell. Both leave
+a dead end by the shortest way to the nearest open cell. Neither is the spanning-tree construction
+of Gabriely and Rimon.
 
 Spanning-tree coverage, source: Gabriely and Rimon, "Spanning-tree based coverage of
 continuous areas by a mobile robot", 2001. The area is cut into blocks of 2 x 2 cells, a
@@ -14,8 +14,8 @@ Deviation, for incomplete blocks: a node of the tree is a connected part of a
 block. Each node begins with a closed walk of its own, the cycle of a whole
 block or a walk there and back through the cells of a part. A tree edge joins
 two closed walks into one: if both run along the common side, one copy of
-that step on either side is exchanged for the two steps across, at no cost;
-otherwise the one step across is walked there and back. All steps, each counted
+their step on each side is replaced by the two steps across, at no cost;
+otherwise a single step across is walked there and back. All steps, each counted
 as often as it is walked, form an even connected multigraph, and any Eulerian
 circuit of it is the walk.
 """
@@ -54,7 +54,7 @@ def sweep(
         scratch: working memory.
         start: the cell to start from.
         order: directions in the order they are tried.
-        turns_along: whether the order is counted from the heading, east at first.
+        turns_along: whether the directions are relative to the heading, which is east at first.
         end: the cell to end in, -1 for anywhere.
         walk: out, int32 (capacity,); a longer walk is cut.
     """
@@ -113,7 +113,7 @@ def _has_step(tree: TreeSteps, cell: int, direction: int) -> bool:
 
 @inner_kernel
 def _add(tree: TreeSteps, cell: int, direction: int, times: int) -> None:
-    """Walk a step ``times`` more often (or less, below 0), seen from either of its cells."""
+    """Add ``times``, which may be negative, to the count of a step from ``cell``."""
     if direction > NORTH:
         cell += tree.offsets[direction]
     tree.times[cell, direction & 1] += times
@@ -155,7 +155,7 @@ def _grow_node(tree: TreeSteps, first: int, number: int) -> None:
                 size += 1
                 _add(tree, here, direction, 2)
     if sides == 8:
-        # All four sides, seen from both ends: the cycle takes each once.
+        # All four sides were counted from both of their ends: the cycle takes each once.
         for index in range(4):
             here = cells[index]
             for direction in _inner_directions(tree, here):
@@ -187,7 +187,7 @@ def _join(tree: TreeSteps, here: int, direction: int) -> None:
 
 @inner_kernel
 def _step_out(tree: TreeSteps, reached: NDArray[np.uint8], first: int) -> tuple[int, int]:
-    """Return the first step (cell, direction) out of a node to one not reached; (-1, 0) for none.
+    """Return the first step (cell, direction) from a node to one not yet reached, or (-1, 0).
 
     ``first`` is one of the node's cells, ``reached`` uint8 (nodes,).
     """
@@ -209,7 +209,7 @@ def _step_out(tree: TreeSteps, reached: NDArray[np.uint8], first: int) -> tuple[
 
 @inner_kernel
 def _span(tree: TreeSteps, start: int, nodes: int) -> None:
-    """Span the nodes by a tree, depth first from that of ``start``, and join along it."""
+    """Span the nodes by a tree, depth first from the node of ``start``; join their closed walks."""
     reached = np.zeros(nodes, np.uint8)
     first = np.full(nodes, -1, np.int64)
     for cell in range(tree.node.size):
@@ -274,7 +274,7 @@ def spanning_tree_walk(
         start: flat cell where the walk begins and ends.
     """
     cols, size = steps.shape[1], steps.size
-    # A node of its own for "to be covered, not yet labelled".
+    # Number of cells that are to be covered and have no label yet.
     unlabelled = size
     node = np.full(size, NO_NODE, np.int32)
     for cell in range(size):

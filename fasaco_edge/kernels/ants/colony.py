@@ -12,15 +12,14 @@ Eq. (7)      local update, after every move              ``settle``
 Eq. (8)      global update along the best walk           ``deposit``
 ===========  ==========================================  ======================
 
-The ants of a group walk at the same time, on the trail that the groups before them
-left. Then (7) is applied for each of their moves, ant by ant. So the ants of a group
-may walk on several threads, and the result is the same for any number of them.
+The ants of a group all walk on the trail that earlier groups left. Then (7) is applied to each of
+their moves, ant by ant. So the ants of a group may walk on several threads, and the result does not
+depend on the number of threads.
 
-Where the paper does not say: a tie in (4) goes straight on; a dead end is left by
-the shortest walk to the nearest cell not yet covered, whose moves are moves
-like any other, (7) included. The paper prints "max p_k" for the second branch
-of (4), which would make it the first again; as in ant colony systems, (6) is
-drawn from.
+Where the paper does not decide: in a tie of (4) an ant goes straight on; it leaves a dead end by
+the shortest walk to the nearest cell not yet covered, and (7) applies to these moves, too. The
+paper prints "max p_k" for the second branch of (4), which would equal the first branch; as in ant
+colony systems, the direction is drawn with the probabilities (6) instead.
 """
 
 from typing import NamedTuple
@@ -40,9 +39,9 @@ from fasaco_edge.kernels.jit import as_value, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.kernels.random import draw_unit
 
-# Denominator of eta in equation (5): the distance to a neighbour, which is 1; the
-# distance an ant of this velocity will go; one more than the open cells beside the
-# neighbour (Warnsdorff's rule: visit cells first that will soon be cut off).
+# Denominator of eta in equation (5): the distance to a neighbour, which is 1; the distance that an
+# ant of this velocity will go; 1 + the number of open cells beside the neighbour (Warnsdorff's
+# rule: visit cells first that will soon be cut off).
 NEIGHBOUR, DISTANCE, FEWEST_OPEN = 0, 1, 2
 
 
@@ -73,7 +72,7 @@ class ColonyState(NamedTuple):
     """The ants' graph, trail and rules.
 
     Attributes:
-        graph: where they walk; all wanted cells, and the end, can be reached from the start.
+        graph: its wanted cells, and the end, can all be reached from the start.
         trail: pheromone on the move out of a cell in each direction, float64 (n, 4), > 0.
         rules: constants.
     """
@@ -122,7 +121,7 @@ def _choose(
 ) -> int:
     """Return a direction in ``mask`` by equation (4).
 
-    Weights are float64 (k, 4), those in ``row`` count; ``random`` is int64 (4,).
+    Weights are float64 (k, 4), of which ``row`` is used; ``random`` is int64 (4,).
     """
     total, best, best_weight = 0.0, heading, 0.0
     for turn in range(4):
@@ -198,7 +197,7 @@ def walk_ants(
     """Let ants walk on a constant trail.
 
     Args:
-        colony: their graph, trail and rules.
+        colony: graph, trail and rules.
         scratch: working memory.
         velocity: cells an ant keeps straight on for, at least 1.
         streams: int64 (ants, 4): state of each ant's random stream, words of 32 bits,
@@ -217,7 +216,7 @@ def _pull(colony: ColonyState, walk: NDArray[np.int32], towards: float) -> None:
     for index in range(walk.size - 1):
         here, gap = walk[index], walk[index + 1] - walk[index]
         for direction in range(4):
-            # With one column, east and north are the same difference: the mask decides.
+            # With one column, east and north have the same offset: the mask decides.
             if graph.offsets[direction] == gap and graph.steps[here] >> direction & 1:
                 trail[here, direction] = (1.0 - alpha) * trail[here, direction] + alpha * towards
                 break
@@ -230,12 +229,12 @@ def settle(
     """Apply the local update (7) for every move, ant by ant.
 
     Args:
-        colony: whose trail is changed.
+        colony: its trail is changed.
         walks: int32 (ants, capacity).
         lengths: int64 (ants,).
 
     Returns:
-        The index of the cheapest walk, of equals the first, and its cost [us].
+        Index of the cheapest walk, the first if several are equal, and its cost [us].
     """
     rules = colony.rules
     best, least = 0, 0

@@ -50,7 +50,7 @@ LOST = _Ant(NOTHING, 0, 0, 0)
 
 @lean_inner_kernel
 def _search(ground: Ground, colony: DiscColony, here: int, goal: int) -> int:
-    """Return the nearest open cell or tunnel end, or ``goal`` if it is given; NOTHING if far."""
+    """Return the nearest open cell or tunnel end, or a given ``goal``; NOTHING if it is too far."""
     colony.counts[SEARCHES] += 1
     number = np.int32(colony.counts[SEARCHES])
     colony.seen[here] = number
@@ -76,9 +76,9 @@ def _search(ground: Ground, colony: DiscColony, here: int, goal: int) -> int:
 
 @lean_inner_kernel
 def _go_to(ground: Ground, prices: Prices, colony: DiscColony, ant: _Ant, goal: int) -> _Ant:
-    """Return the ant at the nearest open cell or tunnel end, or at ``goal``; LOST if that is far.
+    """Return the ant at the nearest open cell or tunnel end, or at ``goal``; LOST if it is too far.
 
-    The cell that it reaches is not listed.
+    The cell reached is not added to the ant's sequence.
     """
     found = _search(ground, colony, ant.here, goal)
     if found == NOTHING:
@@ -178,7 +178,7 @@ def walk_ant(
     """Let an ant walk through the disc into ``colony.new``.
 
     Returns:
-        Its items and its cost [us]; NOTHING items if it gave up.
+        Length of its sequence, NOTHING if it gave up, and its cost [us].
     """
     cells, turn_us = walk.cells, prices.quarter_turn_us
     left = open_disc(ground, colony, disc)
@@ -291,7 +291,7 @@ def _pull(
 
 @inlined
 def cohort(colony: DiscColony) -> int:
-    """Return the number of the cohort that rebuilds the present disc: they take turns."""
+    """Return the number of the cohort that rebuilds the present disc; the cohorts take turns."""
     return int((colony.counts[DISCS] - 1) % colony.rules.velocities.size)
 
 
@@ -304,7 +304,7 @@ def rebuild_disc(
     saved: NDArray[np.int32],
     random: NDArray[np.uint64],
 ) -> int:
-    """Rebuild a disc of a walk by the cheapest ant whose walk differs.
+    """Rebuild a disc of a walk by the cheapest ant whose walk differs from the present one.
 
     Each ant's moves get the local update (7).
 

@@ -1,9 +1,9 @@
 """Fold of a walk: the part within a disc is taken out, so that ants can rebuild it.
 
-The walk enters and leaves the disc several times. Each stretch of it outside of the disc becomes a
-tunnel: an ant enters at one end, at no cost, and continues at the other. So ants can join lanes
-that are far apart in the walk. The first stretch stays first, and the last one last. What an ant
-returns, cells and tunnels in sequence, is unfolded into a walk again.
+The walk enters and leaves the disc several times. Each of its stretches outside of the disc becomes
+a tunnel: an ant enters at one end, at no cost, and continues at the other. So ants can join lanes
+that are far apart in the walk. The first stretch stays first, and the last one last. The ant's
+sequence of cells and tunnels is then unfolded into a walk.
 """
 
 from typing import NamedTuple
@@ -26,7 +26,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
 MOST_CELLS, MOST_TUNNELS, MOST_ITEMS = 300, 64, 2048
 # Limit on the cells visited by the search for a way out of a dead end.
 FARTHEST = 300
-# No heading, as before the first move.
+# In place of a heading, before the first move.
 AHEAD = 4
 NOTHING = -1
 # Entries of ``DiscColony.counts``.
@@ -41,7 +41,7 @@ class AntRules(NamedTuple):
         powers: float64 (5,): eta ** beta of a move, by the number of its quarter-turns.
         ants: number of ants that rebuild a disc; the cheapest counts.
         radius: least and largest radius of a disc.
-        velocities: int64 (cohorts,): velocity of each cohort, which take turns.
+        velocities: int64 (cohorts,): velocity of each cohort; the cohorts take turns.
         amount: delta phi of equation (8).
     """
 
@@ -75,7 +75,7 @@ class DiscColony(NamedTuple):
         came_from: int8 (n,): direction by which it was reached.
         queue: int32 (FARTHEST + 4,).
         counts: int64 (3,): SEARCHES, DISCS and ANTS so far.
-        saved_us: int64 (cohorts,): what discs rebuilt by each cohort have saved so far [us].
+        saved_us: int64 (cohorts,): cost saved so far by the discs that each cohort rebuilt [us].
         rules: constants.
     """
 
@@ -143,7 +143,7 @@ def direction_of(ground: Ground, one: int, other: int) -> int:
 
 @lean_inner_kernel
 def end_at(colony: DiscColony, cell: int) -> int:
-    """Return the first tunnel end at a cell that is not taken, or NOTHING."""
+    """Return the first tunnel end at a cell whose tunnel is not taken, or NOTHING."""
     end = colony.first_end[cell]
     while end != NOTHING and colony.is_taken[end >> 1]:
         end = colony.next_end[end]
@@ -167,7 +167,7 @@ def _mark(ground: Ground, walk: Walk, colony: DiscColony, centre: int, radius: i
     cells, labels, number = walk.cells, colony.labels, colony.counts[DISCS]
     colony.queue[0] = centre
     size = neighbourhood(ground, colony.queue[:1], radius, labels, number, colony.area)
-    # A jump is no step: the cells at its ends stay outside.
+    # Cells at a jump, which is no step, stay outside.
     for index in range(walk.counts[LENGTH] - 1):
         if not leads(ground, cells[index], cells[index + 1]):
             for cell in (cells[index], cells[index + 1]):

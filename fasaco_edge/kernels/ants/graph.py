@@ -1,8 +1,8 @@
 """The graph that walks are built on cell by cell, and the shortest walk out of a dead end.
 
 Cells are flat indices ``row * cols + col``; n of them. A walk is an int32 array
-with a separate length; if the array is too short, the length counts on and nothing is
-written, so that the caller can retry with a longer array.
+with a separate length; if the array is too short, nothing more is written, but the length still
+grows, so that the caller can retry with a longer array.
 """
 
 from typing import NamedTuple
@@ -19,9 +19,8 @@ class Graph(NamedTuple):
     Attributes:
         steps: step masks, uint8 (n,).
         wanted: uint8 (n,), 1 for the cells to visit.
-        open_steps: uint8 (n + 2 * cols,), bit ``1 << direction`` where a step leads to a
-            wanted cell; cell c stands at index ``c + cols``. With the margins no
-            test is needed whether a neighbour exists.
+        open_steps: uint8 (n + 2 * cols,), bit ``1 << direction`` where a step leads to a wanted
+            cell; cell c stands at index ``c + cols``. The margins serve neighbours beyond the grid.
         offsets: int64 (4,), difference of flat index for a step in each direction.
     """
 
@@ -65,7 +64,7 @@ def begin(graph: Graph, scratch: WalkScratch, start: int) -> int:
 
 @lean_inner_kernel
 def close(graph: Graph, scratch: WalkScratch, cell: int) -> None:
-    """Note the visit of ``cell``: it is no longer open, so the steps to it lead to no open cell."""
+    """Mark ``cell`` as visited: steps to it no longer lead to an open cell."""
     at = cell + graph.offsets[1]
     for direction in range(4):
         scratch.open_steps[at + graph.offsets[direction]] &= 255 ^ (1 << ((direction + 2) & 3))

@@ -5,9 +5,9 @@ manipulation", 1973, depth first without recursion. Two blocks share at most one
 cell, a cut vertex; a step joins two cells of exactly one block; a block of two
 cells is a bridge.
 
-Islands are the cells of a block that are joined by steps at an independent set. A step
-between two islands touches no cell of the set, so a bound that counts the steps at the
-set's cells does not count it yet. The least number of such steps is found here.
+An island is a set of cells of a block, joined by steps at an independent set. A step between two
+islands touches no cell of the set, so a bound that counts the steps at the set's cells does not
+count it yet. This module finds the least number of such steps.
 """
 
 from typing import NamedTuple
@@ -75,7 +75,7 @@ def biconnected_blocks(steps: NDArray[np.uint8], offsets: NDArray[np.int64], roo
         if low[here] < rank[before]:
             low[before] = min(low[before], low[here])
         else:
-            # Nothing from here on reaches above ``before``: a block ends there.
+            # No cell from here on reaches above ``before``: a block ends there.
             first[blocks] = filled
             blocks += 1
             cells[filled] = before
@@ -138,14 +138,14 @@ def find_islands(sea: Sea, chosen: NDArray[np.uint8], colour: NDArray[np.uint8])
     An island's colour is that of its chosen cells. They agree: a step from a chosen cell leads to a
     cell of the other colour that is not chosen, and a step from there that belongs to the island
     leads to a chosen cell again. A wanted cell that is not chosen and has no chosen neighbour is an
-    island by itself, and counts with the other colour than its own. So in an island all cells of
-    its colour are chosen. Two islands of one colour are never one step apart: one end of the step
-    would have that colour, so it would be chosen, and would join them.
+    island by itself, and counts with the opposite colour. So in an island all cells of its colour
+    are chosen. Two islands of one colour are never one step apart: one end of the step would have
+    that colour, so it would be chosen, and would join them.
 
     Args:
         sea: the block; ``island`` is written for its cells.
-        chosen: uint8 (n,), the independent set, wanted cells all.
-        colour: uint8 (n,), 0 or 1, differing along each step.
+        chosen: uint8 (n,), the independent set; all its cells are wanted.
+        colour: uint8 (n,), 0 or 1; neighbours differ.
     """
     for cell in sea.cells:
         sea.island[cell] = NO_ISLAND
@@ -176,15 +176,15 @@ def find_islands(sea: Sea, chosen: NDArray[np.uint8], colour: NDArray[np.uint8])
 def spanning_weight(sea: Sea, islands: int) -> tuple[int, int]:
     """Return the weight of a minimum spanning tree over islands, and of its heaviest edge.
 
-    Weights are distances in steps through cells of no island. It is enough to look at
-    neighbours in the Voronoi diagram (Mehlhorn, "A faster approximation algorithm for
-    the Steiner problem in graphs", 1988); met in the order of their weight (Kruskal).
+    Weights are distances in steps through cells of no island. It is enough to look at neighbours in
+    the Voronoi diagram (Mehlhorn, "A faster approximation algorithm for the Steiner problem in
+    graphs", 1988), in the order of their weight (Kruskal).
     """
     tail = _spread(sea)
     parent = np.arange(islands)
     total, heaviest, head = 0, 0, 0
     while head < tail:
-        # All cells at a distance of ``ring`` steps: first the steps within the ring.
+        # Cells at a distance of ``ring`` steps: first steps within the ring, then outward.
         ring, begin = sea.away[sea.queue[head]], head
         while head < tail and sea.away[sea.queue[head]] == ring:
             head += 1
@@ -200,7 +200,7 @@ def spanning_weight(sea: Sea, islands: int) -> tuple[int, int]:
 
 @inner_kernel
 def measure_from(sea: Sea, source: int) -> None:
-    """Write each cell's distance from ``source`` [steps] into ``away``; islands are cleared."""
+    """Write each cell's distance from ``source`` [steps] into ``away``, and clear the islands."""
     for cell in sea.cells:
         sea.island[cell] = NO_ISLAND
     sea.island[source] = 0
@@ -233,7 +233,7 @@ def _spread(sea: Sea) -> int:
 
 @inner_kernel
 def _join(sea: Sea, parent: NDArray[np.int64], cell: int, away: int) -> int:
-    """Join the islands of ``cell`` and of neighbours at ``away`` steps; return how many."""
+    """Join the islands of ``cell`` and of neighbours at ``away`` steps; return how many joins."""
     joined = 0
     for direction in range(4):
         if sea.steps[cell] >> direction & 1:

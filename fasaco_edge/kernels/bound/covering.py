@@ -3,15 +3,15 @@
 A walk from ``start`` to ``end`` visits all required cells; start and end count as
 required. Each bound below counts some steps that every such walk makes.
 
-*Blocks.* Restrict the walk to one biconnected block B. It leaves B by a cut vertex and
-returns by the same one, so without its excursions it is a walk in B: from a, the start
-or the cut vertex towards it, to b, the end or the cut vertex towards it. It visits the
-wanted cells of B: the required ones, and cut vertices with required cells beyond them.
-It is open, a != b, only in blocks between start and end. A block whose only wanted cell
+*Blocks.* Restrict the walk to one biconnected block B. The walk leaves B by a cut vertex and
+returns by the same vertex, so without its excursions it is a walk in B. That walk begins in a, the
+start or the cut vertex towards the start, and ends in b, the end or the cut vertex towards the end.
+It visits the wanted cells of B: the required cells, and cut vertices with required cells beyond
+them. It is open, a != b, only in blocks between start and end. A block whose only wanted cell
 is a counts 0. No step lies in two blocks, so the bounds of the blocks add up.
 
 *Independent set.* Let I be wanted cells of B, no two of them neighbours. A step has
-at most one end in I, so visits to I share no steps. Each has a step before it and one
+at most one end in I, so visits to I share no steps. Each visit has a step before it and one
 after it, except the first and the last cell of an open walk. So a closed walk makes
 2 |I| steps at I, an open one 2 |I| - [a in I] - [b in I]. Any I is valid: the matching from
 which it is derived only determines its size.
@@ -19,13 +19,14 @@ which it is derived only determines its size.
 *Islands.* Cells joined by steps at I are an island; only islands with wanted cells
 count. If there are k > 1, the walk makes further steps between them, none of them at I:
 (1) Islands have two colours, and no step joins two of one colour (see ``blocks.find_islands``).
-A walk enters and leaves each of the m islands of a colour, which takes 2 m steps, as no
-step serves two of these islands; one less for each end of the walk in one of them. With
-both ends in the same island it leaves that one, too, and returns: 2 m.
-(2) Its paths from island to island connect them, so they weigh no less than a minimum spanning
-tree. If it is closed, or ends in the island where it began, it crosses every cut at least twice.
-Take the cut at the tree's heaviest edge, which is the lightest edge across that cut: without one of
-its crossings the other paths still connect the islands, so all weigh at least tree + heaviest.
+A walk enters and leaves each of the m islands of a colour, which takes 2 m steps, as no step serves
+two of these islands. Each end of the walk in one of them saves a step; but if both ends are in the
+same island, the walk also leaves that island and returns: 2 m.
+(2) The walk's paths from island to island connect all islands, so they weigh no less than a minimum
+spanning tree. If the walk is closed, or ends in the island where it began, it crosses every cut at
+least twice. Take the cut at the tree's heaviest edge, which is the lightest edge across that cut:
+without one of its crossings the other paths still connect the islands, so all paths together weigh
+at least tree + heaviest.
 
 *Return.* An open walk and a shortest path from b to a form a closed walk: its bound minus
 the distance is a bound.
@@ -33,9 +34,9 @@ the distance is a bound.
 *Parity.* Each step changes the colour on the chessboard: the colours of a and b determine
 whether the number of steps is even.
 
-*End anywhere.* A shortest walk ends in a required cell, the last one it visits. So the
-bound is the least of those for given ends: all blocks closed, minus the largest saving by
-open blocks between start and end, found from the leaves of the block tree up.
+*End anywhere.* A shortest walk ends in a required cell, the last one it visits. So the bound is the
+least of the bounds over all ends: all blocks closed, minus the largest saving by open blocks
+between start and end, found from the leaves of the block tree up.
 """
 
 from typing import NamedTuple
@@ -74,13 +75,13 @@ class BlockBounds(NamedTuple):
         offsets: int64 (4,), difference of flat index for a step in each direction.
         colour: uint8 (n,), 0 or 1 as on a chessboard.
         wanted: uint8 (n,), 1 for required cells and cut vertices on the way to them.
-        block: int32 (n,), number of the last block that was cut out with the cell.
+        block: int32 (n,), number of the last block handled with the cell.
         inside: uint8 (n,), step masks inside that block.
-        links: uint8 (n,), the same, to wanted cells alone.
+        links: uint8 (n,), step masks inside that block to wanted cells alone.
         pairing: a matching of the block's wanted cells.
-        chosen: uint8 (n,), an independent set of them.
+        chosen: uint8 (n,), an independent set of these wanted cells.
         island, away: int32 (n,), see ``Sea``.
-        open_steps: int32 (n,), bound of the walk over that block that ends in the cell.
+        open_steps: int32 (n,), bound of the walk over that block which ends in the cell.
     """
 
     steps: NDArray[np.uint8]
@@ -105,8 +106,8 @@ def covering_bound(
 
     Args:
         steps: step masks, uint8 (rows, cols); symmetric.
-        required: uint8 (rows, cols), 1 for cells to visit; those that cannot be reached
-            from the start are left out.
+        required: uint8 (rows, cols), 1 for cells to visit; cells that cannot be reached from the
+            start are ignored.
         start: first flat cell ``row * cols + col`` of the walk.
         end: its last flat cell, reachable; -1 for anywhere.
     """
@@ -164,13 +165,13 @@ def _bounds_for(steps: NDArray[np.uint8], required: NDArray[np.uint8]) -> BlockB
 
 @inner_kernel
 def _bound_block(bounds: BlockBounds, cells: NDArray[np.int32], count: int, number: int) -> int:
-    """Return the bound of a closed walk over a block; write those of open ones.
+    """Return the bound of a closed walk over a block; write the bounds of open walks.
 
     Args:
         bounds: the lattice; ``open_steps`` is written for all wanted cells but the top.
         cells: int32, the block's cells: the top, the other wanted ones, the rest.
         count: how many of them are wanted, the top among them.
-        number: of the block, from 1.
+        number: number of the block, from 1.
     """
     if cells.size == 2:
         bounds.open_steps[cells[1]] = 1
@@ -187,9 +188,9 @@ def _bound_block(bounds: BlockBounds, cells: NDArray[np.int32], count: int, numb
     same = 1 if bounds.colour[top] else 0
     closed, first = 0, -1
     for attempt in range(3):
-        # The first two sets are largest sets that leave out as many cells of one colour as
-        # possible; the second leaves out the top, of that colour, if a largest set can. If so, the
-        # third leaves out the top, and of the other colour the cells that can be left out with it.
+        # Each set is as large as any. The first leaves out as few cells of the top's colour as
+        # possible, the second as many; so it leaves out the top if any largest set does. Then the
+        # third leaves out the top, and as many cells of the other colour as possible.
         if attempt == 2:
             if bounds.chosen[top]:
                 break

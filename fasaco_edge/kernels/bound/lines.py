@@ -16,10 +16,10 @@ class Lines(NamedTuple):
 
     Attributes:
         sides: uint8 (m,), step masks, in the order of the rows.
-        rank: int32 (m,), number of each of them in the order of the columns.
+        rank: int32 (m,), number of each cell in the order of the columns.
         links: uint8 (2, m), 1 where a step leads to the next cell: along rows, along columns.
-        wanted: uint8 (m,), 1 for cells that need a passage: those to cover, except the start
-            and a given end.
+        wanted: uint8 (m,), 1 for cells that need a passage: cells to cover, except the start and a
+            given end.
         start, end: numbers of cells; end -1 for anywhere.
     """
 
@@ -32,13 +32,13 @@ class Lines(NamedTuple):
 
 
 class StepPrices(NamedTuple):
-    """Prices of the steps to the next cell: the cell pays them, the next one receives them.
+    """Prices of the steps to the next cell: the cell pays, the next cell receives.
 
     All arrays are int64 (2, m): along rows, along columns, in their order.
 
     Attributes:
         price: in force [half us].
-        best: those of the best bound so far.
+        best: prices of the best bound so far.
         trend: running mean of the directions of ascent [1 / 256].
         use: payments minus receipts of a price in the cheapest passages; before that is known,
             working memory.
@@ -64,7 +64,7 @@ def lines_of(
 
     Args:
         steps: step masks, uint8 (rows, cols); symmetric.
-        required, reached: uint8 (rows, cols), 1 for cells to visit, and that can be reached.
+        required, reached: uint8 (rows, cols), cells to visit, cells that can be reached.
         start, end: flat cells that can be reached; end -1 for anywhere.
     """
     rows, cols = steps.shape

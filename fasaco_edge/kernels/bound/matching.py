@@ -23,7 +23,7 @@ class Bipartite(NamedTuple):
 
     Attributes:
         cells: int32 (k,), flat cells.
-        links: uint8 (n,), for each of these cells a mask of its steps to others of them.
+        links: uint8 (n,), mask of the steps from each of these cells to another of them.
         colour: uint8 (n,), 0 or 1; linked cells differ.
         offsets: int64 (4,), difference of flat index for a step in each direction.
     """
@@ -94,7 +94,7 @@ def match(graph: Bipartite, pairing: Pairing, budget: int) -> None:
 
 @inner_kernel
 def _match_lone_cells_first(graph: Bipartite, pairing: Pairing) -> None:
-    """Match cells with one partner left, each a safe choice; else the next cell in order."""
+    """Match cells with one partner left, which loses nothing; else the next cell in order."""
     mate, lone, degree = pairing.mate, pairing.queue, pairing.degree
     waiting = 0
     for cell in graph.cells:
@@ -186,17 +186,17 @@ def choose_independent(
 ) -> int:
     """Choose an independent set; return its size.
 
-    Of colour ``side`` the single cells, ``first``, and the mates of displaced cells are chosen; of
-    the other colour all cells but the neighbours of these, which are displaced. So the set is
-    independent whatever the matching is. It is as large as any (Koenig) if the matching is maximum
-    and no single cell can be reached from ``first``.
+    Chosen of colour ``side`` are the single cells, ``first``, and the mates of displaced cells.
+    Displaced are the cells of the other colour beside a chosen one; all its other cells are chosen.
+    So the set is independent whatever the matching is. It is as large as any (Koenig) if the
+    matching is maximum and no single cell can be reached from ``first``.
 
     Args:
         graph: the cells and links.
         pairing: a matching of them.
         side: colour 0 or 1.
         first: a cell of colour ``side`` that must be chosen, or -1.
-        chosen: out, uint8 (n,), 1 for the set's cells, 0 for others of the graph.
+        chosen: out, uint8 (n,), 1 for the set's cells, 0 for other cells of the graph.
     """
     queue, tail, size = pairing.queue, 0, 0
     for cell in graph.cells:

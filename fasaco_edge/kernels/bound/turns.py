@@ -4,10 +4,10 @@ Sources: Held and Karp 1970 for prices that rise where a relaxed walk is inconsi
 Fekete and Krupke, "Practical methods for computing large covering tours and cycle covers with
 turn cost", 2019, for the relaxation: a walk is a set of passages, one for each visit of a cell.
 
-A passage enters its cell by one side and leaves it by another one, or by the same. It costs a step,
+A passage enters its cell by one side and leaves it by another or the same side. It costs a step,
 half of it for each side, and its quarter-turns: none straight on, one at a corner, two in a U-turn.
 The first and the last visit have only one side, and cost half a step. Give each step a price that
-the cell left pays and the cell entered receives. Prices cancel along a walk, so its cost is
+the cell before it pays and the cell after it receives. Prices cancel along a walk, so its cost is
 unchanged. If no passage has a negative reduced cost, a walk costs at least the sum of:
 
 * the cheapest first visit of the start;
@@ -16,10 +16,11 @@ unchanged. If no passage has a negative reduced cost, a walk costs at least the 
   the cell where that saves most, because a best walk ends at the first visit of a cell to cover.
 
 After every iteration the prices are projected onto feasible ones, which give a valid bound; the
-best one counts. Along a line of cells the price of a step may fall by at most one step's cost
+best bound counts. Along a line of cells the price of a step may fall by at most one step's cost
 between consecutive steps; otherwise going straight would have a negative cost. Pooling adjacent
-violators (isotonic regression) projects onto that. Corners and U-turns are feasible if the price at
-each side is within a bound; the row's and the column's bound add up to a corner's cost.
+violators (isotonic regression) is the projection onto that limit. Corners and U-turns are feasible
+if the price at each side is within a bound; the row's and the column's bound add up to a corner's
+cost.
 
 All amounts are whole half microseconds: halves of steps, and sums that do not depend on order.
 """
@@ -74,7 +75,7 @@ def _level(
 
 @lean_inner_kernel
 def _fit_boxes(lines: Lines, prices: StepPrices, step: int, turn: int) -> None:
-    """Divide the cost of a corner between a cell's two axes, as each needs."""
+    """Divide the cost of a corner between a cell's two axes, as each of them needs."""
     rows, cols = prices.price[ALONG_ROWS], prices.price[ALONG_COLS]
     corner, least, most = step + turn, step // 2, step // 2 + turn
     for cell in range(lines.sides.size):
@@ -121,8 +122,8 @@ def _clamp(
             before = -NO_SIDE
 
 
-# Weights, of 256, of the running mean of directions and of a new one. Trials on grids of 170 to
-# 9,000 cells: 230 is slower at first, 160 no better in the end.
+# Weights [1 / 256] of the running mean of directions and of the newest direction. Trials on grids
+# of 170 to 9,000 cells: KEPT 230 gains more slowly at first, 160 is no better in the end.
 KEPT, ADDED = 200, 56
 UNIT = 256
 
@@ -132,11 +133,11 @@ def ascend(lines: Lines, prices: StepPrices, step: int, turn: int, falls: int, t
     """Improve the prices; return the best bound found [half us], with its prices in ``best``.
 
     A subgradient method with exactly feasible iterates: each price follows the imbalance of its
-    step, leavings minus entries, averaged over the last iterations.
+    step, departures minus arrivals, averaged over the last iterations.
 
     Args:
         lines: the cells, two or more.
-        prices: initial ones, feasible or not; changed in place.
+        prices: initial prices, feasible or not; changed in place.
         step, turn: a step and a quarter-turn [half us], the step an even number.
         falls: over all iterations the step size of the prices, a quarter-turn at first, falls by a
             factor of about e ** falls.
@@ -156,7 +157,7 @@ def ascend(lines: Lines, prices: StepPrices, step: int, turn: int, falls: int, t
 
 @inlined
 def _copy(source: NDArray[np.int64], target: NDArray[np.int64]) -> None:
-    """Copy prices; an assignment would ask whether the two arrays overlap, and allocate."""
+    """Copy prices; an assignment would test whether the two arrays overlap, and allocate."""
     for axis in range(2):
         for index in range(source.shape[1]):
             target[axis, index] = source[axis, index]

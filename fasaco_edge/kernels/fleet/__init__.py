@@ -1,1 +1,1 @@
-"""Kernels that share a ground among several robots: its blocks, and closed walks over it."""
+"""Kernels for several robots on one ground: an estimate of each robot's driving time."""

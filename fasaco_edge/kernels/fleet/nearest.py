@@ -1,7 +1,7 @@
 """Nearest-neighbour walks over the parts of robots: an estimate of each robot's time for its part.
 
-A robot drives straight on while the cell ahead is its own and unswept, else to the nearest such
-cell. All numbers are integers, so that results are equal on all machines.
+A robot drives straight on while the cell ahead is its own and unswept; else it drives to its
+nearest unswept cell. All numbers are integers, so that results are equal on all machines.
 """
 
 from typing import NamedTuple
@@ -15,14 +15,14 @@ NONE = -1
 
 
 class _Ground(NamedTuple):
-    """The cells, and working memory of the search for the nearest one.
+    """The cells, and working memory of the search for the nearest cell.
 
     Attributes:
         steps: step masks, uint8 (size,).
         offsets: int64 (4,), difference of flat index for a step in each direction.
-        owner: int64 (size,), the robot that has to sweep each cell; NONE for a swept one.
-        seen: int32 (size,), number of the last search that found each.
-        came: uint8 (size,), direction of the step to each in that search.
+        owner: int64 (size,), the robot that has to sweep each cell; NONE for a swept cell.
+        seen: int32 (size,), number of the last search that found the cell.
+        came: uint8 (size,), direction of the step to the cell in that search.
         queue: int32 (size,).
     """
 
@@ -36,7 +36,7 @@ class _Ground(NamedTuple):
 
 @lean_inner_kernel
 def _quarters(before: int, after: int) -> int:
-    """Return the quarter turns between two directions; 0 if either is NONE."""
+    """Return the quarter-turns between two directions; 0 if either is NONE."""
     turn = (after - before) & 3
     return min(turn, 4 - turn) if min(before, after) > NONE else 0
 
@@ -63,7 +63,7 @@ def _nearest(ground: _Ground, robot: int, here: int, clock: int) -> int:
 
 @lean_inner_kernel
 def _walk(ground: _Ground, robot: int, here: int, count: int, clock: int) -> tuple[int, int, int]:
-    """Walk over all ``count`` cells of a robot; return steps, quarter turns and the clock."""
+    """Walk over all ``count`` cells of a robot; return steps, quarter-turns and the clock."""
     steps, offsets, owner = ground.steps, ground.offsets, ground.owner
     length, quarters, heading = 0, 0, NONE
     while count:
@@ -80,7 +80,7 @@ def _walk(ground: _Ground, robot: int, here: int, count: int, clock: int) -> tup
         found = _nearest(ground, robot, here, clock)
         if found == NONE:
             return length + count, quarters, clock
-        # Follow the way from its end to its begin.
+        # Follow the way from its end to its beginning.
         cell, after = found, NONE
         while cell != here:
             direction = int(ground.came[cell])
@@ -100,17 +100,17 @@ def walk_parts(
     owners: NDArray[np.int64],
     starts: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """Return how long the walks are.
+    """Return the steps and quarter-turns of each robot's walk.
 
     Args:
         steps: step masks, uint8 (size,).
         offsets: int64 (4,), difference of flat index for a step in each direction.
         cells: flat cells to sweep, int64 (n,).
-        owners: the robot of each, int64 (n,).
+        owners: the robot of each cell, int64 (n,).
         starts: flat cell of each robot, int64 (k,).
 
     Returns:
-        steps and quarter turns of each robot, int64 (k, 2); a cell that it cannot reach counts as a
+        int64 (k, 2): steps and quarter-turns of each robot; a cell that it cannot reach counts as a
         step.
     """
     size = steps.size

@@ -1,9 +1,10 @@
 """Annealing of the driven line: random moves, some of which may lose a little at first.
 
 At each point of the line in turn one move is drawn: remove the next one or two points, move the
-next point, shift the edge after it, cut the corner at it, or reroute the edge before it over
-unswept floor nearby. Lengths of a move are drawn over several octaves. A move that loses less than
-a temperature times a random number is accepted, too (Metropolis); the temperature falls to 0.
+next point, shift the edge after that point, cut the corner at it, or reroute the edge before it
+over unswept floor nearby. The length of a move is drawn from several octaves. A move that loses
+less than a temperature times a random number is accepted, too (Metropolis); the temperature falls
+to 0.
 
 Source: S. Kirkpatrick, C. D. Gelatt, M. P. Vecchi, Optimization by Simulated Annealing, 1983.
 No libm function is called, so results are equal on all machines.
@@ -36,7 +37,7 @@ HOTTEST = 0.16
 FARTHEST, OCTAVES = 2.5, 5
 # Number of moves of each kind in sixteen; the rest are detours over unswept floor.
 LEFT_OUT, MOVED, SHIFTED, CUT = 2, 4, 3, 3
-# A cut leaves at least this much of an edge.
+# Largest share of an edge that a cut removes.
 MOST_CUT = 0.95
 # Unit exponential variates, rounded: the logarithm's last bits differ between machines.
 EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536) / 65536
@@ -98,7 +99,7 @@ def _shift(
 def _shift_lanes(
     line: Line, memory: MoveMemory, random: NDArray[np.uint64], begin: int, far: float
 ) -> tuple[int, int]:
-    """Shift three edges behind ``begin``'s next point together, as two lanes side by side."""
+    """Shift three edges after ``begin``'s next point together, as two lanes side by side."""
     points, new = line.points, memory.new
     a = line.next[begin]
     b = line.next[a]
@@ -115,7 +116,7 @@ def _shift_lanes(
 
 @lean_inner_kernel
 def _cut(line: Line, memory: MoveMemory, random: NDArray[np.uint64], begin: int, far: float) -> int:
-    """Cut the corner behind ``begin``."""
+    """Cut the corner after ``begin``."""
     points, new = line.points, memory.new
     middle = line.next[begin]
     for number in range(2):
@@ -169,7 +170,7 @@ def _draw_move(
     """Draw a move at a point.
 
     Returns:
-        Number of points of ``memory.new`` to insert, or NO_MOVE; the point after these.
+        Number of points of ``memory.new`` to insert, or NO_MOVE; and the point after them.
     """
     far = FARTHEST * floor.tool
     middle = line.next[begin]
@@ -209,16 +210,16 @@ def anneal(
     heat: tuple[float, float],
     most_tried: int,
 ) -> float:
-    """Anneal a line until a number of moves were tried.
+    """Anneal a line until ``most_tried`` moves were tried.
 
     Args:
-        line: counted into ``floor.sweeps``; of two points or more.
+        line: two points or more; its sweeps are counted in ``floor.sweeps``.
         floor, price, memory: as for ``polish``.
         random: uint64 (1,), not 0.
         margin: 1 if the first and the last edge only define the turns after and before them, as
             for a piece of a longer line; else 0.
-        heat: first and last temperature, as shares of the initial one.
-        most_tried: limit on the moves tried, including those tried before.
+        heat: first and last temperature, as shares of the initial temperature ``HOTTEST``.
+        most_tried: limit on the moves tried, earlier moves included.
 
     Returns:
         The total gain [s]; it may be negative.

@@ -35,7 +35,7 @@ def right_of(
 
     Args:
         y: height.
-        ay, ax, by, bx: its ends, the lower one first.
+        ay, ax, by, bx: the capsule's ends, the lower one first.
         side_y, side_x: offset from its ends to its right side; ``slope``: columns of that side per
             row. ``side_y`` is infinite for a level capsule, whose sides are rows.
         square: square of its radius.
@@ -69,14 +69,14 @@ def _blocked_row(
     """Return the first row with a blocked pixel nearer than ``radius`` to the segment a to b.
 
     Also return the first and the last column in which that pixel may be; ``CLEAR`` or ``BEYOND`` in
-    place of the row if there is none.
+    place of the row if no pixel is blocked.
 
     A pixel is a square: the stretch of a row whose pixels touch the capsule is widest at the height
     in the row that is nearest to the capsule's outermost point.
 
     Args:
-        blocked: uint64 (rows, words), see ``bits``. What lies outside is blocked, too.
-        ay, ax, by, bx: the way [pixels].
+        blocked: uint64 (rows, words), see ``bits``. Pixels outside count as blocked.
+        ay, ax, by, bx: the segment [pixels].
         radius: of the robot [pixels].
     """
     rows, cols = blocked.shape[0], blocked.shape[1] << 6
@@ -138,8 +138,8 @@ def is_clear(
     """Return whether no blocked pixel is nearer than ``radius`` to the segment a to b.
 
     Args:
-        blocked: uint64 (rows, words), see ``bits``. What lies outside is blocked, too.
-        ay, ax, by, bx: the way [pixels].
+        blocked: uint64 (rows, words), see ``bits``. Pixels outside count as blocked.
+        ay, ax, by, bx: the segment [pixels].
         radius: of the robot [pixels].
     """
     if _is_box_clear(blocked, ay, ax, by, bx, radius - TOUCH):
@@ -158,7 +158,7 @@ def is_clear_but(
     radius: float,
     blocker: NDArray[np.int64],
 ) -> bool:
-    """Return as ``is_clear``; write a pixel in the way into ``blocker``, int64 (2,): row, col."""
+    """Return as ``is_clear``; write a blocking pixel into ``blocker``, int64 (2,): row, col."""
     row, first, last = _blocked_row(blocked, ay, ax, by, bx, radius)
     if row < 0:
         return row == CLEAR

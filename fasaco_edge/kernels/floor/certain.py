@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import inlined, kernel, lean_inner_kernel
 
-# Edge of a tile [pixels], and of a block, as shifts too.
+# Edges of a tile and of a block [pixels], and their binary logarithms.
 TILE_SHIFT, BLOCK_SHIFT = 7, 3
 TILE, BLOCK = 1 << TILE_SHIFT, 1 << BLOCK_SHIFT
 # Blocks, and bytes, along a tile.
 BLOCKS = TILE // BLOCK
 # Rows and columns of tiles that a rotated tile can overlap.
 NEAR = 3
-# Within this many pixels all positions of a tile are counted from one corner.
+# Positions of a tile within this many pixels are counted from one corner.
 MOST_TOGETHER = 1 << 20
 
 ONE, SEVEN, ALL = np.uint64(1), np.uint64(7), np.uint8(255)
@@ -32,7 +32,7 @@ class FloorTiles(NamedTuple):
     """Tiles of floor.
 
     Attributes:
-        places: int64 (n, 2), sorted: the pixels of (i, j) begin with (TILE * i, TILE * j).
+        places: int64 (n, 2), sorted: tile (i, j) begins with pixel (TILE * i, TILE * j).
         bits: uint8 (n, TILE, BLOCKS).
     """
 
@@ -44,9 +44,9 @@ class Whereabouts(NamedTuple):
     """Possible positions of a map that has moved.
 
     Attributes:
-        places: float64 (k, k, 4), in row n the first n + 1: each a ``Similarity`` (see
+        places: float64 (k, k, 4), rows of positions: row n has n + 1, each a ``Similarity`` (see
             ``mission.coverage.floor_tiles``) of translation and rotation only.
-        counts: int64 (m,), number of positions checked for each requested tile.
+        counts: int64 (m,), number of positions checked for each requested tile: row ``counts - 1``.
     """
 
     places: NDArray[np.float64]
@@ -70,8 +70,8 @@ class _Around(NamedTuple):
 class _Lookup(NamedTuple):
     """Transform of points [pixels] into ``_Around``.
 
-    A point lies in row ``right * row + i0 + up * col``, column ``j0 - up * row + right * col`` from
-    a corner on, and the corner at (``rows``, ``cols``).
+    The point (row, col) is ``right * row + i0 + up * col`` rows and ``j0 - up * row + right * col``
+    columns from a corner, which is pixel (``rows``, ``cols``) of ``_Around``.
     """
 
     right: float
@@ -105,10 +105,10 @@ def _find_deep(
     deep: NDArray[np.uint64],
     rows: NDArray[np.uint64],
 ) -> None:
-    """Find the swept blocks, and those of them whose neighbours are all swept.
+    """Find the swept blocks and the deep ones.
 
-    ``whole`` and ``deep``, uint64 (n, BLOCKS), receive them, the first of a row in the lowest bit;
-    ``rows``, uint64 (BLOCKS + 2,), is for the blocks of a tile and those beside it.
+    ``whole`` and ``deep``, uint64 (n, BLOCKS), receive them, the first block of a row in the lowest
+    bit; ``rows``, uint64 (BLOCKS + 2,), is working memory for the blocks of a tile and beside it.
     """
     for tile in range(len(tiles.bits)):
         for i in range(BLOCKS):
@@ -143,7 +143,7 @@ def _find_deep(
 
 @lean_inner_kernel
 def _find_bounds(place: NDArray[np.float64], row: int, col: int, bounds: NDArray[np.int64]) -> None:
-    """Find the window, int64 (4,), that the pixels of the tile from pixel (row, col) on lie in."""
+    """Find the window, int64 (4,), with the pixels of a tile that begins with (row, col)."""
     least_i, least_j, most_i, most_j = np.inf, np.inf, -np.inf, -np.inf
     row0, col0, right, up = place
     for corner in range(4):
@@ -189,7 +189,7 @@ def _pixel(lookup: _Lookup, row: float, col: float) -> tuple[np.uint64, np.uint6
 def _leave_at(
     lookup: _Lookup, around: _Around, row: int, col: int, left: NDArray[np.uint8]
 ) -> bool:
-    """Unmark unswept pixels of the tile with first pixel (row, col); return if any is left."""
+    """Unmark unswept pixels of the tile that begins with (row, col); return whether any is left."""
     is_any = False
     for top in range(0, TILE, BLOCK):
         for byte in range(BLOCKS):
@@ -225,7 +225,7 @@ def certain_floor(
     Args:
         before: all tiles before the map moved.
         after: the requested tiles.
-        whereabouts: possible positions of the map, for each of these.
+        whereabouts: possible positions of the map, for each requested tile.
     """
     whole, deep = np.empty((2, len(before.bits), BLOCKS), np.uint64)
     _find_deep(before, whole, deep, np.empty(BLOCKS + 2, np.uint64))
@@ -244,8 +244,8 @@ def certain_floor(
             _find_bounds(places[number], row, col, bounds[number])
         row0, col0 = bounds[:count, 0].min(), bounds[:count, 1].min()
         row1, col1 = bounds[:count, 2].max(), bounds[:count, 3].max()
-        # If far apart, as for a map that jumped, each counts from its own corner: for a centre on
-        # the border of two pixels rounding decides.
+        # Positions far apart, as after a jump of the map, are counted from a corner each: larger
+        # numbers are rounded more, which decides for a centre on the border of two pixels.
         is_near = (row1 - row0) * (col1 - col0) <= MOST_TOGETHER
         # The last position first, as it leaves the fewest pixels.
         for number in range(count - 1, -1, -1):

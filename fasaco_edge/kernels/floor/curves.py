@@ -33,11 +33,11 @@ class LinePlaces(NamedTuple):
 
     Attributes:
         poses: float64 (n, 3): x, y, yaw along the line.
-        way: float64 (n,): way along the line [pixels].
+        way: float64 (n,): distance along the line [pixels].
         leg: int64 (n,): number of the straight; below 0 for a pose at which the robot starts.
         worth_s: float64 (n,): price of the floor that only the piece of the line from this place to
             the next one sweeps [s].
-        window: float64 (n,): way along the line that a word to a place may replace [pixels].
+        window: float64 (n,): distance along the line that a word to a place may replace [pixels].
     """
 
     poses: NDArray[np.float64]
@@ -48,7 +48,7 @@ class LinePlaces(NamedTuple):
 
 
 class Base(NamedTuple):
-    """What driving takes.
+    """The robot's base: what it can drive, and what driving costs.
 
     Attributes:
         radius: of arcs [pixels].
@@ -81,7 +81,7 @@ class Ways(NamedTuple):
 
     Attributes:
         cost_s: float64 (2 n,) [s]; infinite where none is known.
-        previous: int64 (2 n,): the state before; ``NONE`` at the start.
+        previous: int64 (2 n,): the state before the word; ``NONE`` at the start.
         sides: int8 (2 n, 5), lengths: float64 (2 n, 5): the word from there [radii].
     """
 
@@ -202,7 +202,7 @@ def _left_s(
 def _step(
     line: LinePlaces, base: Base, clear: NDArray[np.uint64], number: int, back: int, ways: Ways
 ) -> None:
-    """Drive on along a straight, or turn at its beginning, on the spot if it is a large bend."""
+    """Drive straight on, or turn at the beginning of a straight, on the spot if it is sharp."""
     state, before = 2 * number + back, 2 * number - 2 + back
     dx = line.poses[number, 0] - line.poses[number - 1, 0]
     dy = line.poses[number, 1] - line.poses[number - 1, 1]
@@ -235,7 +235,7 @@ def _link(
     ways: Ways,
     memory: WordMemory,
 ) -> None:
-    """Drive a word from one state to another, if that is cheaper than the way known."""
+    """Drive a word from one state to another, if it is cheaper than the known way."""
     begun = ways.cost_s[before]
     first, last = before >> 1, state >> 1
     turned, turns_to = math.pi * (before & 1), math.pi * (state & 1)
@@ -291,7 +291,7 @@ def find_ways(
         line: the places.
         base: the robot.
         places, clear: uint64 (rows, words), see ``bits``: pixels whose centre the robot can occupy
-            and reach; those where it has its clearance.
+            and reach; pixels where it also has its clearance.
         ways: to fill: the costs of the states where the robot may start are 0.
         memory: to work with.
     """
@@ -326,10 +326,10 @@ def count_swept(
 
     Args:
         points: float64 (n, 2): x, y.
-        way: float64 (n,): way along the line [pixels].
+        way: float64 (n,): distance along the line [pixels].
         reachable: bool (rows, cols): pixels that count.
         half: half of the tool's width [pixels].
-        apart: way along the line between two sweeps of a pixel, above which they are two [pixels].
+        apart: sweeps of a pixel further apart along the line than this count as two [pixels].
     """
     rows, cols = reachable.shape
     first = np.full((rows, cols), NONE, np.int32)

@@ -67,8 +67,8 @@ def _round_over(
     """Try five detours over ``memory.place`` from the edge after ``begin``.
 
     Returns:
-        The best gain, at least ``best`` [s], and its number of points, in ``memory.best``; 0
-        points if none is better.
+        The best gain, at least ``best`` [s], and the number of points of that detour, which are in
+        ``memory.best``; 0 if none is better.
     """
     points, new = line.points, memory.new
     end = line.next[begin]
@@ -125,7 +125,7 @@ def detour(
 ) -> float:
     """Reroute the edge after ``begin`` over unswept floor nearby; return the gain [s].
 
-    A block and those around it must have ``least`` unswept pixels.
+    The block and its neighbours together must have ``least`` unswept pixels.
     """
     points, left = line.points, floor.sweeps.left
     end = line.next[begin]
@@ -225,7 +225,7 @@ def sweep_patches(
         line, floor, memory, farthest: as for ``polish``.
         price: value of a pixel of a patch.
         patches: bool (rows, cols), of blocks, see ``find_patches``.
-        most_tried: limit on the moves tried, including those tried before.
+        most_tried: limit on the moves tried, earlier moves included.
     """
     place = memory.place
     for i in range(patches.shape[0]):

@@ -1,8 +1,8 @@
 """The driven line as a list of points: gain of a change, and its execution.
 
-A change replaces the points between two others. Its gain is exact: seconds of the chains before
-and after, with the turns at either end, and the difference in swept pixels. Each block of pixels
-stores the time of the line's last change there.
+A change replaces the points between two other points. Its gain is exact: seconds of the chains
+before and after, with the turns at either end, and the difference in swept pixels. Each block of
+pixels stores the time of the line's last change there.
 """
 
 from typing import NamedTuple
@@ -30,12 +30,12 @@ LEAST_GAIN_S = 1e-3
 LEAST_EDGE = 0.3
 # Limit on the points that a move inserts.
 MOST_NEW = 4
-# Limit on the points of a chain: those replaced, and two on either side.
+# Limit on the points of a chain: the replaced points, and two on either side.
 MOST_CHAIN = MOST_NEW + 4
 # Limit on the capsules compared: edges of the chains before and after.
 MOST_CAPSULES = 2 * (MOST_CHAIN - 1)
 NONE = -1
-# Number of new points of an attempt that is no move.
+# In place of a number of new points: the attempt is no move.
 NO_MOVE = -1
 
 
@@ -70,7 +70,7 @@ class Floor(NamedTuple):
 
     Attributes:
         blocked: uint64 (rows, words), see ``bits``: pixels the robot must not touch.
-        places: the same: reachable places of the robot.
+        places: uint64 (rows, words): reachable places of the robot.
         sweeps: sweeps by the line.
         robot, tool: their radii [pixels].
         clear: radius of the robot with its clearance [pixels].
@@ -96,7 +96,7 @@ class Price(NamedTuple):
 
 class MoveMemory(NamedTuple):
     """Memory for a move: points before and after, float64 (MOST_CHAIN, 2); the points to insert,
-    those of the best move so far, and a place, float64 (MOST_NEW, 2)."""
+    the points of the best move so far, and a place, float64 (MOST_NEW, 2)."""
 
     before: NDArray[np.float64]
     after: NDArray[np.float64]
@@ -135,11 +135,11 @@ def left_around(
 
 
 class Chains(NamedTuple):
-    """The points in ``MoveMemory.before`` and ``after``: those replaced, and up to two beside them.
+    """The points in ``MoveMemory.before`` and ``after``: replaced points, up to two beside.
 
     Attributes:
-        lead: number of the first point whose edge changes; the one before it defines a turn.
-        olds, news: points before and after; 0 where they are too many.
+        lead: number of the first point whose edge changes; the point before it defines a turn.
+        olds, news: numbers of points in ``before`` and ``after``; 0 if there are too many.
         last_old, last_new: the last point whose edge changes.
     """
 
@@ -221,12 +221,12 @@ def gain_above(
 ) -> float:
     """Return the gain if ``memory.new[:count]`` replace the points between two others [s].
 
-    -inf if it is less than ``least_s``, which may be below 0, or if the new edges are blocked.
+    Return -inf for a gain below ``least_s``, which may be negative, and if a new edge is blocked.
 
     Args:
         line, floor, price, memory: see above.
-        begin: number of the point before.
-        end: number of the point after; NONE if the line ends with the new points.
+        begin: number of the point before the replaced ones.
+        end: number of the point after them; NONE if the line ends with the new points.
         count: number of new points.
         least_s: see above.
     """
@@ -259,7 +259,7 @@ def gain_above(
 @lean_inner_kernel
 def note_change(line: Line, begin: int, tool: float, hops: int, now: int) -> int:
     """Return when the line was last changed around some points, beginning with the point before
-    ``begin``; with ``now`` above 0 note a change there."""
+    ``begin``; if ``now`` is above 0, also note a change there."""
     points = line.points
     number = line.previous[begin] if line.previous[begin] != NONE else begin
     low_y, low_x = points[number, 0], points[number, 1]
@@ -285,7 +285,7 @@ def note_change(line: Line, begin: int, tool: float, hops: int, now: int) -> int
     return newest
 
 
-# Number of points before and after a point whose moves depend on it.
+# A change affects the moves at this many points before and after it.
 HOPS = 6
 
 
@@ -299,7 +299,7 @@ def has_room(line: Line) -> bool:
 def _sweep_between(
     line: Line, floor: Floor, memory: MoveMemory, begin: int, end: int, times: int
 ) -> None:
-    """Count the edges between two points in (``times`` 1) or out again (-1)."""
+    """Add the edges between two points to the counts (``times`` 1) or remove them (-1)."""
     points, following = line.points, line.next
     number = begin
     while number != end and following[number] != NONE:
@@ -324,8 +324,8 @@ def replace_points(
         exchange(floor.sweeps, scratch, taken, given, tool)
     else:
         _sweep_between(line, floor, memory, begin, end, as_value(-1))
-    # New points reuse the numbers of the replaced ones. Free numbers are taken only after these: a
-    # caller that holds a number sees the same or a new point.
+    # New points take the numbers of the replaced points first, then free numbers. So a number that
+    # a caller holds belongs to the same or to a new point.
     free, last = following[begin], begin
     for number in range(count):
         if free != end and free != NONE:  # noqa: PLR1714 - numba has no `in` for tuples

@@ -14,17 +14,17 @@ from fasaco_edge.kernels.floor.sweeps import (
 )
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
-# States of a pixel: it is wanted; the line is to sweep it; it is swept.
+# Bits of a pixel's state: it is wanted; the line is to sweep it; it is swept.
 WANTED, OPEN, SWEPT = 1, 2, 4
 # The line has passed the pixel, whether or not the robot swept it: this line does not go back.
 PASSED = 32
-# Position in a pixel's state of the cause why it is out of reach.
+# The cause why a pixel is out of reach: its first bit in the pixel's state, and its mask.
 CAUSE_SHIFT, CAUSE = 3, 24
 
 
 @inlined
 def _is_bare(state: NDArray[np.uint8], row: int, col: int) -> bool:
-    """Return whether a pixel and the three after it, below and beside, are wanted and not swept."""
+    """Return whether the 2 by 2 pixels from (row, col) on are all wanted and not swept."""
     if row < 0 or col < 0 or row + 1 >= state.shape[0] or col + 1 >= state.shape[1]:
         return False
     both = WANTED | SWEPT
@@ -48,7 +48,7 @@ def pass_line(
     """Note that the robot has passed a part of its line; return the number of pixels closed by it.
 
     Args:
-        sweeps: whose counts go up by ``NEVER`` where a pixel is no longer open.
+        sweeps: counts of sweeps; they go up by ``NEVER`` where a pixel is no longer open.
         state: uint8 (rows, cols) of ``WANTED``, ``OPEN``, ``SWEPT`` and ``PASSED``, changed.
         points: float64 (n, 2): y, x [pixels].
         radius: of the tool [pixels].
@@ -85,17 +85,18 @@ def set_open(
     """Set the wanted, swept and open pixels of a part of the raster.
 
     The same sweep on two rasters differs along its rim by less than a pixel. So a wanted unswept
-    pixel is open only if it is one of two by two such pixels, and the line has not passed it.
+    pixel is open only if it belongs to a square of two by two wanted unswept pixels, and the line
+    has not passed it.
 
     Args:
-        sweeps: their counts are higher by ``NEVER`` where a pixel is not open.
+        sweeps: counts of sweeps, higher by ``NEVER`` where a pixel is not open.
         state: uint8 (rows, cols) of ``WANTED``, ``OPEN``, ``SWEPT`` and ``PASSED``, changed.
         corner: first pixel (row, col) of the part.
         wanted: bool (rows, cols) of the part, wanted pixels; empty for no change.
         swept: bool (rows, cols) of the part.
 
     Returns:
-        Increase in the number of wanted pixels, of those that are swept, and of open ones.
+        Increases in the numbers of wanted pixels, of swept wanted pixels, and of open pixels.
     """
     counts, left = sweeps.counts, sweeps.left
     more_wanted, more_swept, more_open = 0, 0, 0

@@ -28,8 +28,8 @@ TIE = 1e-6
 def disc_rows(radius: float) -> NDArray[np.int64]:
     """Return the reach of a disc around a pixel's centre in its own row and the following ones.
 
-    int64 (n,): number of pixels it touches on either side of the middle one, in the row that many
-    rows above or below. A pixel is a square, as for ``capsule.is_clear``.
+    int64 (n,): number of pixels it touches on either side of the middle one, at index i for the row
+    i rows above or below. A pixel is a square, as for ``capsule.is_clear``.
     """
     radius -= TOUCH
     rows = np.arange(int(np.ceil(radius - 0.5)) + 1)
@@ -44,8 +44,7 @@ def places_of(blocked: Bits, disc: NDArray[np.int64]) -> Bits:
     """Return the pixels at whose centre a disc touches nothing blocked.
 
     Args:
-        blocked: uint64 (rows, words), see ``bits``. Its rim, as wide as the disc, and what lies
-            beyond are blocked.
+        blocked: uint64 (rows, words), see ``bits``. A rim as wide as the disc must be blocked.
         disc: see ``disc_rows``.
     """
     return ~spread(blocked, disc)
@@ -112,8 +111,8 @@ def keep_in_cells(
     """
     is_level = placement.uy == 0.0
     for i in range(found.shape[0]):
-        # On an axis-aligned lattice a row of pixels lies in one row of cells, mostly that of the
-        # row before.
+        # On an axis-aligned lattice a row of pixels lies in one row of cells, mostly the same as
+        # the row of pixels before.
         row = _cell_of(placement, corner[0] + i, corner[1])[0] - cell[0]
         if is_level and not 0 <= row < chosen.shape[0]:
             for word in range(found.shape[1]):
@@ -159,7 +158,7 @@ def _step_aside(
     clear: float,
     stand: NDArray[np.float64],
 ) -> None:
-    """Move a stand without clearance to the nearest place of its cell with it, if near enough."""
+    """Move a stand without clearance to a place of its cell that has it, if near enough."""
     y, x = stand[0], stand[1]
     if is_clear(blocked, y, x, y, x, clear):
         return
@@ -197,8 +196,8 @@ def choose_stands(
     Args:
         blocked, places: uint64 (rows, words), see ``bits``, of the raster, whose pixel (0, 0) is
             around the point (0, 0).
-        placement: where the lattice's cells lie on it; its radius is the robot's.
-        stale: bool (rows, cols): the cells to look at.
+        placement: where the lattice's cells lie on the raster; its radius is the robot's.
+        stale: bool (rows, cols): the cells to compute.
         row0, col0: the first cell (row, col) of the arrays.
         clear: radius of the robot with its clearance [pixels].
         stands: float64 (rows, cols, 2): y, x [pixels], filled in; NaN where there is no place.
@@ -261,7 +260,7 @@ def _bend(
     """Find the place over which the path from a to b is shortest; False if there is none.
 
     ``blockers``, int64 (2, 2), is a cache: the pixels, row and col, that last blocked the segments
-    from a and to b. Mostly they block again, and that test is fast.
+    from a and to b. Mostly they block the next segments, too, and testing them is fast.
     """
     blockers[:] = FAR
     rows, cols = places.shape[0], places.shape[1] << 6
@@ -308,8 +307,8 @@ def link_stands(
 
     Args:
         blocked, places: of the raster.
-        placement: of the lattice's cells on it.
-        stale: bool (rows, cols): the cells to look at.
+        placement: of the lattice's cells on the raster.
+        stale: bool (rows, cols): the cells to compute.
         stands: float64 (rows, cols, 2), see ``choose_stands``.
         steps: uint8 (rows, cols), changed: bit ``1 << direction`` for each legal step.
         bends: float32 (rows, cols, 2, 2), changed: where the step east, and the step north, has

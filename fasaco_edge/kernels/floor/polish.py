@@ -1,9 +1,9 @@
-"""Polish: greedy descent of the driven line on driving time plus a price of unswept floor.
+"""Polish: greedy changes of the driven line, to lower driving time plus a price of unswept floor.
 
 Four moves are tried at each point of the line in turn: remove the next one or two points, move the
 next point, shift the edge after it as a whole, and reroute the edge before it over unswept floor
-nearby. A move is made if it gains. A point is skipped if nothing near it has changed since it was
-last tried.
+nearby. A move is made if it gains. A point is skipped if nothing near it has changed since its last
+trial.
 """
 
 import numpy as np
@@ -91,7 +91,7 @@ def _move(line: Line, memory: MoveMemory, begin: int, attempt: int) -> tuple[int
 
 @lean_inner_kernel
 def _move_to_meeting(line: Line, memory: MoveMemory, begin: int) -> tuple[int, int]:
-    """Move the point after ``begin`` to where the edges before and after its own would meet."""
+    """Move the point after ``begin`` to the crossing of the edges before and after its own two."""
     points, following, preceding, new = line.points, line.next, line.previous, memory.new
     middle = following[begin]
     end = following[middle]
@@ -161,7 +161,7 @@ def _propose(line: Line, memory: MoveMemory, begin: int, attempt: int) -> tuple[
     """Write the points of an attempt at a point into ``memory.new``.
 
     Returns:
-        Number of points to insert, or NO_MOVE; the point after these.
+        Number of points to insert, or NO_MOVE; and the point after them.
     """
     if attempt < MOVES:
         end = line.next[line.next[begin]]
@@ -177,7 +177,7 @@ def _propose(line: Line, memory: MoveMemory, begin: int, attempt: int) -> tuple[
 
 @inlined
 def _after_gain(attempt: int) -> int:
-    """Return the attempt that follows one that gained."""
+    """Return the attempt to make after one that gained."""
     if attempt < MOVES:
         return 0
     first = MOVES if attempt < MEETING else MEETING + 1
@@ -192,7 +192,7 @@ def polish(
     """Polish a line until no move gains, or a number of moves were tried.
 
     Args:
-        line: counted into ``floor.sweeps``.
+        line: its sweeps are counted in ``floor.sweeps``.
         floor, price, memory: see ``kernels.floor.line``.
         farthest: unswept floor further from an edge is ignored [pixels].
         most_tried: limit on the moves tried.
@@ -229,7 +229,7 @@ def polish(
             if line.next[begin] == NONE:
                 pass_s += gain
                 break
-            # Detours are added last: the other moves cannot remove one that has become needless.
+            # Detours are added last: the other moves cannot remove a needless detour.
             if passes > 0:
                 gain += detour(line, floor, price, memory, begin, farthest, least)
             elif gain == 0.0:

@@ -1,10 +1,10 @@
-"""Reordering of the driven line: in what order it passes the floor.
+"""Reordering of the driven line: its parts are driven in another order.
 
-Annealing changes the shape of the line and keeps this order. Here the line leaves an edge for a
-point nearby, and a stretch is reversed (2-opt) or moved elsewhere (or-opt) for it: ways between
+Annealing changes the shape of the line and keeps its order. Here a new edge joins two points
+nearby, and a stretch of the line is reversed (2-opt) or moved elsewhere (or-opt): ways between
 lanes get shorter and cross less. Two or three edges are replaced, all others stay, some driven
-backward. The gain is exact, as in ``line``. Only moves that gain are made: a temperature gained
-nothing more.
+backward. The gain is exact, as in ``line``. Only moves that gain are made: accepting losses, as
+annealing does, gained nothing more.
 
 Sources: G. A. Croes, A method for solving traveling-salesman problems, 1958 (2-opt); I. Or,
 Traveling salesman-type combinatorial problems, 1976 (or-opt).
@@ -35,12 +35,12 @@ from fasaco_edge.kernels.random import draw
 
 
 class Exchange(NamedTuple):
-    """Edges of a line that others replace.
+    """Edges of a line, and the edges that replace them.
 
     Attributes:
-        olds, news: int64 (3, 4), point numbers: the one before an edge, its two ends, and the one
-            behind, NONE beyond the line's ends. An edge without a second end is none.
-        size: int64 (1,): how many there are of each.
+        olds, news: int64 (3, 4), four points for each edge: the point before it, its two ends, and
+            the point after it; NONE beyond the line's ends. Without a second end there is no edge.
+        size: int64 (1,): number of edges in each.
     """
 
     olds: NDArray[np.int64]
@@ -138,7 +138,7 @@ def _gain(line: Line, floor: Floor, price: Price, memory: MoveMemory, edges: Exc
 
 @lean_inner_kernel
 def _sweep(line: Line, floor: Floor, memory: MoveMemory, edges: Exchange) -> None:
-    """Count the edges of an exchange out and in."""
+    """Remove the old edges of an exchange from the counts, and add the new ones."""
     olds = _copy_edges(line.points, edges.olds, edges.size[0], memory.before)
     news = _copy_edges(line.points, edges.news, edges.size[0], memory.after)
     taken, given = _prepare(floor, memory, olds, news)
@@ -177,17 +177,17 @@ def exchange_stretch(
     e: int,
     is_turned: bool,
 ) -> float:
-    """Move the stretch from ``b`` to ``c`` behind ``e``, or reverse it, if that gains.
+    """Move the stretch from ``b`` to ``c`` after ``e``, or reverse it, if that gains.
 
-    A stretch that moves has two points or more; it is neither next to ``e`` nor to the point behind
+    A stretch that moves has two points or more; it is next to neither ``e`` nor the point after
     ``e``.
 
     Args:
         line, floor, price, memory: as for ``gain_above``.
         edges: working memory.
-        b, c: first and last point of the stretch; there is one before it.
-        e: the point to move it behind; NONE to reverse it where it is.
-        is_turned: whether it is driven backward.
+        b, c: first and last point of the stretch; another point precedes ``b``.
+        e: the point to move it after; NONE to reverse it in its place.
+        is_turned: whether the stretch is driven backward.
 
     Returns:
         The gain [s]; 0.0 if the line is as before.
@@ -234,7 +234,7 @@ def exchange_stretch(
     return gain
 
 
-# Farthest point that a new edge leads to, in radii of the tool.
+# Largest distance between the ends of a new edge, in radii of the tool.
 FARTHEST = 5.0
 # Most points of a stretch that is moved.
 LONGEST = 16
@@ -274,7 +274,7 @@ def _square(order: LineOrder, line: Line, number: int, side: float) -> tuple[int
 
 @lean_inner_kernel
 def _stretch(line: Line, order: LineOrder, bits: int, c: int, e: int) -> tuple[int, int]:
-    """Return the first and last point of a stretch that begins or ends at ``c``, to move behind
+    """Return the first and last point of a stretch that begins or ends at ``c``, to move after
     ``e``; NONE if there is none."""
     first = last = c
     for _ in range(1 + (bits >> 8) % (LONGEST - 1)):
@@ -289,7 +289,7 @@ def _stretch(line: Line, order: LineOrder, bits: int, c: int, e: int) -> tuple[i
     before = line.previous[first]
     if first == last or before == NONE:
         return NONE, NONE
-    # Not within the stretch, nor at its edges' ends.
+    # ``e`` must be neither in the stretch nor at the ends of its edges.
     if order.at[before] - 1 <= order.at[e] <= order.at[last] + 1:
         return NONE, NONE
     return first, last
@@ -302,10 +302,10 @@ def _draw_move(
     """Draw a move by ``bits``.
 
     A stretch that begins or ends at ``c`` moves next to ``a``, three times in four; otherwise the
-    two points, or those before them, are joined by a reversal.
+    two points, or the points before them, are joined by a reversal.
 
     Returns:
-        The last four arguments of ``exchange_stretch``; its first point is NONE for no move.
+        The last four arguments of ``exchange_stretch``; the first point is NONE for no move.
     """
     if bits & 3:
         e = a if bits & 4 else line.previous[a]
@@ -328,9 +328,9 @@ def reorder(
     memory: MoveMemory,
     random: NDArray[np.uint64],
 ) -> float:
-    """Try a move at each point of a line for half of the points nearby, chosen at random.
+    """At each point of a line, try moves with a random half of the points nearby.
 
-    The times of changes, by which ``polish`` skips points, are not kept.
+    The times of changes, by which ``polish`` skips points, are not updated.
 
     Args:
         line, floor, price, memory, random: as for ``anneal``.

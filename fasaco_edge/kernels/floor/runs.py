@@ -19,21 +19,21 @@ def common_runs(
 ) -> NDArray[np.int64]:
     """Return the common stretches of two walks.
 
-    No step of either walk is in two of them.
+    No step of either walk is in two stretches.
 
     Args:
         before, after: int32 (n, 2) and (m, 2), cells (row, col), both one cell or more.
         least: the fewest steps of a stretch.
 
     Returns:
-        int64 (k, 4), in the order of ``after``: where it begins there; where it begins in
-        ``before``; how many steps it has; 1 where ``before`` goes the other way, else 0.
+        int64 (k, 4), in the order of ``after``: begin in ``after``; begin in ``before``; number of
+        steps; 1 if ``before`` runs the other way, else 0.
     """
     size, most = len(before), len(after)
-    # The index spans the old walk alone: the new walk may be far away, and the index too large.
+    # The index spans ``before`` alone: ``after`` may be far away, and the index too large.
     row0, col0 = before[:, 0].min(), before[:, 1].min()
     rows, cols = before[:, 0].max() - row0 + 1, before[:, 1].max() - col0 + 1
-    # The old walk's visits of each cell, in order.
+    # The visits of each cell in ``before``, in order.
     first = np.full(rows * cols, -1, np.int32)
     following = np.empty(size, np.int32)
     for at in range(size - 1, -1, -1):

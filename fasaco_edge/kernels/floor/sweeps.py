@@ -14,7 +14,7 @@ from fasaco_edge.kernels.jit import inlined, lean_inner_kernel, lean_kernel
 
 # A pixel's centre on the rim counts as covered.
 RIM = 1e-7
-# The side of a block of pixels is 2 ** BLOCK of them.
+# The side of a block is 2 ** BLOCK pixels.
 BLOCK = 3
 # Counts of sweeps of pixels that the tool can never reach begin here.
 NEVER = 10_000
@@ -29,7 +29,7 @@ class Sweeps(NamedTuple):
     Attributes:
         counts: int16 (rows, cols): number of capsules; from ``NEVER`` on for pixels out of the
             tool's reach.
-        left: int32 (rows >> BLOCK, cols >> BLOCK), rounded up: pixels of a block with count 0.
+        left: int32 (rows >> BLOCK, cols >> BLOCK), rounded up: unswept pixels of each block.
     """
 
     counts: NDArray[np.int16]
@@ -37,10 +37,10 @@ class Sweeps(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory to compare capsules in.
+    """Working memory to compare capsules.
 
     Attributes:
-        capsules: float64 (n, len(COLUMNS)), prepared ones.
+        capsules: float64 (n, len(COLUMNS)), prepared capsules.
         before, after: int64 (n, 2), stretches of one row.
     """
 
@@ -59,7 +59,7 @@ def prepare(
     bx: float,
     radius: float,
 ) -> None:
-    """Fill in the capsule of a number."""
+    """Fill in capsule ``number``."""
     if ay > by:
         ay, ax, by, bx = by, bx, ay, ax
     capsule = capsules[number]
@@ -116,8 +116,8 @@ def _add(
 def _next_outside(
     stretches: NDArray[np.int64], count: int, at: int, col: int, last: int
 ) -> tuple[int, int, int]:
-    """Return the next columns from ``col`` to ``last`` in no stretch: first, last, and the stretch
-    to continue with. If first > last there are none."""
+    """Return the next columns from ``col`` to ``last`` that lie in no stretch: first, last, and the
+    stretch to continue with. If first > last there are none."""
     while at < count and col <= last:
         if stretches[at, 1] < col:
             at += 1
@@ -149,7 +149,7 @@ def _lost(
 
 @inlined
 def rows_of(scratch: Scratch, count: int, radius: float, rows: int) -> tuple[int, int]:
-    """Return the first and the last one of ``rows`` that some capsules may meet."""
+    """Return the first and the last of ``rows`` rows that the capsules may meet."""
     capsules = scratch.capsules
     low, high = capsules[0, Y0], capsules[0, Y1]
     for number in range(1, count):
@@ -176,8 +176,8 @@ def stretches_of(
 
 @inlined
 def _over(stretches: NDArray[np.int64], count: int, col: int, end: int) -> tuple[int, int]:
-    """Return how many stretches contain a column, and the column, at most ``end``, from which that
-    number differs."""
+    """Return how many stretches contain a column, and the next column, at most ``end``, where that
+    number changes."""
     times = 0
     for number in range(count):
         begin, behind = stretches[number, 0], stretches[number, 1] + 1
@@ -205,7 +205,7 @@ def swept_more(
     Args:
         counts: int16 (rows, cols), of sweeps, with the capsules to remove.
         scratch: its first ``taken`` capsules are removed, and the next ``given`` added.
-        taken, given: their numbers.
+        taken, given: numbers of capsules to remove and to add.
         radius: of the tool [pixels].
         most_lost: the search stops once more pixels than this are lost.
     """
@@ -240,7 +240,7 @@ def swept_more(
 
 @lean_inner_kernel
 def exchange(sweeps: Sweeps, scratch: Scratch, taken: int, given: int, radius: float) -> None:
-    """Count the first ``taken`` capsules out and the next ``given`` in, where they differ."""
+    """Remove the first ``taken`` capsules from the counts and add the next ``given``."""
     before, after = scratch.before, scratch.after
     counts = sweeps.counts
     rows, cols = counts.shape
@@ -272,7 +272,7 @@ def sweep(
     times: int,
     scratch: Scratch,
 ) -> None:
-    """Count a capsule in (``times`` 1) or out again (-1)."""
+    """Add a capsule to the counts (``times`` 1), or remove it (-1)."""
     prepare(scratch.capsules, 0, ay, ax, by, bx, radius)
     taken = 1 if times < 0 else 0
     exchange(sweeps, scratch, taken, 1 - taken, radius)

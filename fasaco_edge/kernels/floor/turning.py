@@ -2,7 +2,7 @@
 
 The robot brakes to a stop, turns, and starts again. Its rate of turning goes up, stays at its
 limit and goes down (a trapezoid over time), or, in smaller turns, goes up and down (a triangle).
-Needs no compiler, so that a configuration can be checked without one.
+This module needs no compiler, so that a configuration can be checked without one.
 """
 
 import math
@@ -14,11 +14,11 @@ class Turning(NamedTuple):
 
     Attributes:
         steered_rad: a turn up to this is steered while driving, and takes no time [rad].
-        stop_s: additional time of braking before any other turn and starting after it, compared
-            with driving on [s].
-        ramp_s: for the rate to go from rest to its limit [s].
+        stop_s: time lost by braking before any other turn and starting after it, compared with
+            driving on [s].
+        ramp_s: time for the rate to go from rest to its limit [s].
         full_rad: the smallest turn in which the rate reaches its limit [rad].
-        radian_s: a radian at that limit [s].
+        radian_s: duration of a radian at that limit [s].
     """
 
     steered_rad: float
@@ -51,7 +51,7 @@ def limited_turning(
     acceleration_m_s2: float,
     steered_deg: float,
 ) -> Turning:
-    """Return turns of a robot with limits.
+    """Return turns of a robot with limited rates and accelerations.
 
     Args:
         turn_deg_s, turn_deg_s2: rate of turning on the spot, and its acceleration.

@@ -5,8 +5,9 @@ of Minimal Length with a Constraint on Average Curvature, American Journal of Ma
 With reversing: J. A. Reeds and L. A. Shepp, Optimal Paths for a Car that Goes Both Forwards and
 Backwards, Pacific Journal of Mathematics 145 (1990), whose sections are named at the formulas.
 
-Lengths are in turning radii: of an arc its angle. Below 0 a piece is driven backward. A formula
-leads from the pose (0, 0, 0) to x, y [radii], yaw [rad]; it returns NaN where it has no word.
+Lengths are in turning radii, so the length of an arc is its angle. A piece of negative length is
+driven backward. A formula leads from the pose (0, 0, 0) to x, y [radii], yaw [rad]; it returns NaN
+where it has no word.
 """
 
 import math
@@ -20,11 +21,11 @@ from fasaco_edge.kernels.jit import inlined, lean_inner_kernel
 PIECES, MOST_WORDS = 5, 44
 # Images of a formula: its own word, the mirror image, and with reversing both driven the other way.
 MIRRORED, ALL_IMAGES = 2, 4
-# Rounding must not turn a piece of no length into a full circle, nor into none.
+# Rounding must not turn a piece of no length into a full circle, nor lose it.
 TINY = 1e-9
 QUARTER = 0.5 * math.pi
-# Sides of the pieces by formula: 1 left, 0 straight, -1 right. The first three formulas have words
-# forward only, too.
+# Sides of the pieces by formula: 1 left, 0 straight, -1 right. The first three formulas also have
+# words that are driven forward only.
 FORWARD = 3
 SIDES = np.array(
     [

@@ -1,7 +1,7 @@
 """Connected areas of a grid: cells of one kind, connected by their edges.
 
-Two passes over the grid, with a union of pieces that are connected (Rosenfeld and Pfaltz, 1966):
-a hall of a hundred thousand closed chambers takes as long as an empty one.
+Two passes over the grid, with a union of connected pieces (Rosenfeld and Pfaltz, 1966): a map with
+a hundred thousand closed chambers takes as long as an empty one.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,7 @@ class Areas(NamedTuple):
     Attributes:
         labels: int32 (rows, cols), number of each cell's area, from 1; 0 for none.
         kinds: uint8 (n,), the kind of area i + 1.
-        cells: int32 (n,), how many cells it has.
+        cells: int32 (n,), number of cells of area i + 1.
         inner: int32 (n, 2), one of its cells (row, col): the middle of its first longest run in a
             row.
     """
@@ -34,7 +34,7 @@ class Areas(NamedTuple):
 def root(parents: NDArray[np.integer], piece: int) -> int:
     """Return the root of ``piece`` (union-find with path compression).
 
-    Joined pieces form a tree by the parent of each, int (n,); the root is its own parent.
+    ``parents``, int (n,), has the parent of each piece in a tree; a root is its own parent.
     """
     while parents[piece] != piece:
         parents[piece] = parents[parents[piece]]
@@ -153,7 +153,7 @@ def _beside(labels: NDArray[np.int32], row: int, col: int, found: NDArray[np.int
 def cells_beside(areas: Areas, allowed: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Return for each area an allowed cell (row, col) beside it, int32 (n, 2); (-1, -1) for none.
 
-    It is the middle one of all such cells, row by row. An area without a square of two by two cells
+    It is the middle one of these cells, row by row. An area without a square of two by two cells
     has none.
 
     Args:

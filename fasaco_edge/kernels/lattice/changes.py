@@ -1,8 +1,8 @@
 """Differences of two maps on one raster, and the lattice cells that they may change.
 
 Two maps of one building are mostly equal. So strips as wide as the map are compared first, in
-memory order, then segments of the strips that differ, and pixels last. Beyond its window a map is
-unknown: a map that has grown differs where it is known now.
+memory order, then segments of the strips that differ, and pixels last. A map is unknown beyond its
+window: a map that has grown differs in its new part.
 """
 
 import numpy as np
@@ -18,8 +18,8 @@ from fasaco_edge.kernels.lattice.footprint import (
     reach_of,
 )
 
-# Rows of a strip, columns of a segment of it, and columns of a block; the changed pixels of a block
-# mark the cells around them together.
+# Rows of a strip, columns of a segment of a strip, and columns of a block. The changed pixels of a
+# block mark the cells around them together.
 STRIP, SEGMENT, BLOCK = 8, 64, 8
 
 BLANK = -1
@@ -39,7 +39,7 @@ def _shows(pixels: Pixels, box: Box) -> bool:
 
 @lean_inner_kernel
 def _rows_differ(old: NDArray[np.int8], new: NDArray[np.int8]) -> bool:
-    # Without an early end the loop is vectorised; the same below.
+    # Without an early end this loop and those below are vectorised.
     differ = False
     for index in range(len(old)):
         differ = differ | (old[index] != new[index])
@@ -66,7 +66,7 @@ def _is_blank(pixels: Pixels, box: Box) -> bool:
 
 @lean_inner_kernel
 def are_equal(before: Pixels, after: Pixels, box: Box) -> bool:
-    """Return whether two maps are the same in a box; False where one shows a part of it alone."""
+    """Return whether two maps are equal in a box; False if only one of them shows a part of it."""
     if not _shows(before, box):
         return _shows(after, box) and _is_blank(after, box)
     if not _shows(after, box):
@@ -83,7 +83,7 @@ def are_equal(before: Pixels, after: Pixels, box: Box) -> bool:
 def _changed_box(before: Pixels, after: Pixels, box: Box, thresholds: Thresholds) -> Box:
     """Return the smallest box around the changed pixels of a box; without rows if none has.
 
-    A pixel has changed if it was free, occupied or unknown and is something else now.
+    A pixel has changed if its state (free, occupied, unknown) has.
     """
     row0, col0, row1, col1 = box.row1, box.col1, box.row0, box.col0
     are_shown = _shows(before, box) and _shows(after, box)
@@ -146,7 +146,7 @@ def mark_stale(
 ) -> None:
     """Mark the lattice cells whose state or steps may have changed with the pixels.
 
-    If they are most of the lattice, all are marked: searching on would cost more than it saves.
+    If most of the lattice is marked, all of it is: searching on would cost more than it saves.
 
     Args:
         before, after: the maps.

@@ -2,9 +2,9 @@
 
 Most of a map is open floor or unknown: one read of a summed-area table replaces reading
 each pixel under the robot. A table as large as the map would not fit into the cache, and
-would cost more than the changed cells, so each tile has its own, of the pixels around the
-cells to classify. The tables only save work: if they do not have the answer, it is found
-row by row of the disc, or by ``footprint``.
+would cost more than the changed cells, so each tile has its own table, of the pixels around the
+cells to classify. The tables only save work: if they do not suffice, the rows of pixels under the
+disc decide, or ``footprint``.
 """
 
 from typing import NamedTuple
@@ -34,8 +34,8 @@ from fasaco_edge.kernels.lattice.pixels import (
     weigh,
 )
 
-# Approximate pixels of a tile besides those within the robot's reach, and limit on its cells:
-# smaller tables overlap too much, larger ones do not fit the cache.
+# Approximate number of pixels of a tile, besides the margin within the robot's reach, and limit on
+# its cells: smaller tables overlap too much, larger ones do not fit the cache.
 TILE_PIXELS = 192
 MOST_TILE_CELLS = 128
 
@@ -106,7 +106,7 @@ def _classify_states(given: _Map, block: Box, table: PixelSums) -> None:
 def _classify_step(given: _Map, row: int, col: int, towards: int, table: PixelSums) -> None:
     """Settle the steps between a stale cell and its neighbour in the east or north.
 
-    Between a stale cell and one that is not, nothing has changed.
+    Steps to a neighbour that is not stale have not changed.
     """
     pixels, placement, cells = given.pixels, given.placement, given.cells
     back = WEST if towards == EAST else SOUTH
@@ -162,7 +162,7 @@ def classify_cells(
 ) -> None:
     """Fill in state and steps of the stale cells of a lattice.
 
-    Cells that are not stale must be right already, as must each step of theirs.
+    Cells that are not stale must already have their right states and steps.
 
     Args:
         pixels: the map.

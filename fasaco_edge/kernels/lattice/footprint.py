@@ -105,7 +105,7 @@ def lane_is_free(
     """Return whether the rectangle swept from (x, y) to (x + ux, y + uy) is free.
 
     The discs at both ends are known to be free. Pixels are tested against the
-    rectangle by the separating axis theorem, so any yaw of the grid is right.
+    rectangle by the separating axis theorem, which is right for any yaw.
     """
     length = np.sqrt(ux * ux + uy * uy)
     ex, ey = ux / length, uy / length

@@ -39,7 +39,7 @@ def _stretches_beside(
 ) -> int:
     """Find the stretches of a row of pixels outside reached cells; return twice their number.
 
-    ``bounds`` receives the begin and end of each, as columns of the map, whose first pixel is in
+    ``bounds`` receives beginning and end of each, as columns of the map, whose first pixel is in
     column ``first`` of the raster.
     """
     rows, cols = reached.shape
@@ -189,7 +189,7 @@ def _is_off(col: int, x: float, dy: float, radius: float) -> bool:
 def disc_state(pixels: Pixels, x: float, y: float, radius: float, table: PixelSums) -> int:
     """Return the worst state under a disc: blocked before unknown before free.
 
-    Row by row, each in four reads: pixels may be much smaller than the robot. The table
+    Each row takes four reads, as pixels may be much smaller than the robot. The table
     has to span all of the map that the disc touches.
     """
     height, width = pixels.values.shape

@@ -1,7 +1,7 @@
 """Rasterisation of polygons on the lattice: cells inside and near the border, counts of them.
 
-Polygons are followed edge by edge, cells row by row: an order of thousands of corners costs a
-cycle of the control loop milliseconds.
+Polygons are followed edge by edge, cells row by row: an order with thousands of corners takes only
+milliseconds of a cycle of the control loop.
 """
 
 import numpy as np
@@ -34,7 +34,7 @@ def turn_inside(
         corners: float64 (n, 2), x, y [m]; the last is joined to the first.
         row0, col0: place of the cells in the lattice.
         cell_m: edge of a cell [m].
-        cells: in, nowhere marked, and out, bool (rows, cols).
+        cells: in and out, bool (rows, cols); all False before.
     """
     rows, cols = cells.shape
     row1, col1 = row0 + rows, col0 + cols
@@ -72,7 +72,7 @@ def add_near(
     reach_m: float,
     starts: NDArray[np.int32],
 ) -> None:
-    """Add a polygon's border: 1 at the begin of a stretch of cells near it, -1 after its end.
+    """Add a polygon's border: 1 at the beginning of a stretch of cells near it, -1 after its end.
 
     A cell is near if the border touches the square of ``reach_m`` to each side around its centre. A
     cell is near one of several borders if the running sum at it is above 0.
@@ -96,7 +96,7 @@ def add_near(
         for row in range(first_row, last_row):
             left, right = min(x0, x1), max(x0, x1)
             if y0 != y1:
-                # The part of the edge beside the row's squares; of a level edge all of it.
+                # The part of the edge beside the row's squares; a level edge as a whole.
                 slope, y = (x1 - x0) / (y1 - y0), (row + 0.5) * cell_m
                 one = x0 + (min(max(y - reach_m, least), most) - y0) * slope
                 other = x0 + (min(max(y + reach_m, least), most) - y0) * slope

@@ -1,11 +1,10 @@
 """Reachability over a lattice and its update after a change; shortest walks, and costs of walks.
 
-After some cells have changed, the cost of updating reachability depends only on these. Steps
-have changed only in a part of the lattice. If the cells at its rim - those with a step across
-it - are connected inside the part as before, then connectivity outside the part is unchanged:
-any walk can be rerouted. So it is enough to search the part, and to know which cells of its
-rim were reachable. The whole lattice must be searched only if cells of the rim were separated
-or joined.
+After some cells have changed, the update searches only the part of the lattice whose steps may have
+changed. If the cells at its rim - those with a step across it - are connected inside the part as
+before, then connectivity outside the part is unchanged: any walk can be rerouted. So it is enough
+to search the part, and to know which cells of its rim were reachable. The whole lattice must be
+searched only if cells of the rim were separated or joined.
 """
 
 from typing import NamedTuple
@@ -159,8 +158,8 @@ class _Part(NamedTuple):
     """A part of the lattice, in a rectangle whose first cell is (``row``, ``col``).
 
     Attributes:
-        inside: bool (rows, cols), the rectangle's cells that belong to it.
-        labels: int32 (rows, cols), number of the connected piece of each of them, from 1.
+        inside: bool (rows, cols), the rectangle's cells that belong to the part.
+        labels: int32 (rows, cols), number of the connected piece of each such cell, from 1.
         queue: int32 (rows * cols,).
         row, col: first cell of the rectangle.
     """
@@ -263,7 +262,7 @@ def update_reach(
 ) -> bool:
     """Update the reachable cells after steps have changed; return whether that was possible.
 
-    If it was not, nothing was written: use ``reachable_from``.
+    If not, nothing is written: use ``reachable_from``.
 
     Args:
         before, after: step masks, uint8 (rows, cols).

@@ -41,10 +41,10 @@ from fasaco_edge.kernels.random import draw, index_of
 
 # Entries of ``SearchMemory.work``.
 PROPOSALS, PERTURBATIONS = 0, 1
-# No cells are given: what a perturbation changes is drawn.
+# No cells are given: the perturbation draws the cells that it changes.
 DRAWN = -1
 
-# Steps from a disc that ants have rebuilt to the rim of what is improved.
+# Steps from a disc that ants have rebuilt to the rim of the area that is then improved.
 AROUND_DISC = 2
 # Temperatures of an annealing, from 1 down to 1 / 5, in units of 1 / 1024.
 COOLING = np.round(1024 * 0.2 ** (np.arange(8) / 7)).astype(np.int64)
@@ -56,12 +56,12 @@ class PerturbationRules(NamedTuple):
     Attributes:
         limit: cells that a search for another end or a loop settles.
         proposals: proposals for each visit of the walk, or each cell of the surroundings.
-        radius: steps from what was changed to the rim of the surroundings; -1 for
-            the whole walk, at temperature 0.
+        radius: steps from the changed cells to the rim of the surroundings; -1 for the whole walk,
+            at temperature 0.
         temperature_us: temperature that an annealing begins with [us].
         acceptance_us: temperature at which a worse walk is kept [us].
-        loops_of_256: number of 256 perturbations that change the end or add a loop.
-        ants_of_256: number of 256 perturbations in which ants rebuild a disc.
+        loops_of_256: out of 256 perturbations, how many change the end or add a loop.
+        ants_of_256: out of 256 perturbations, in how many ants rebuild a disc.
         strict: whether a walk of equal cost is reverted.
     """
 
@@ -83,7 +83,7 @@ class SearchMemory(NamedTuple):
         best: int32 (capacity,), the best walk.
         best_counts: int64 (3,), its counts as in ``Walk``.
         touched: int32 (n,), cells where the perturbation changed something.
-        area: int32 (n,), their surroundings.
+        area: int32 (n,), surroundings of the touched cells.
         marked: int32 (n,), number of the last perturbation whose surroundings hold the cell.
         work: int64 (2,), PROPOSALS, moves of ants among them, and PERTURBATIONS so far.
     """
@@ -98,9 +98,9 @@ class SearchMemory(NamedTuple):
 
 
 class LocalSearch(NamedTuple):
-    """A local search: where the walk goes, the walk, its prices, working memory, and ants.
+    """A local search: the ground, the walk, its prices, working memory, and ants.
 
-    The walk is changed in place; a worse one than ``memory.best`` may be left behind.
+    The walk is changed in place; in the end it may be worse than ``memory.best``.
     """
 
     ground: Ground
@@ -234,7 +234,7 @@ def _settle(
         ground, walk, prices, memory: see above.
         rules, random: as for ``perturb``.
         touched: number of cells in ``memory.touched``.
-        radius: steps from these to the rim of the surroundings; -1 for the whole walk.
+        radius: steps from those cells to the rim of the surroundings; -1 for the whole walk.
     """
     if radius < 0:
         proposals = rules.proposals * walk.counts[LENGTH]
@@ -266,7 +266,7 @@ def perturb(
         rules: how to perturb.
         times: how often.
         given: number of cells in ``memory.touched`` around which the walk is only improved; DRAWN
-            to draw what is changed.
+            to draw the cells to change.
         random: stream, uint64 (1,), not 0; advanced.
     """
     ground, walk, prices, tally, memory, colony = search

@@ -1,11 +1,11 @@
-"""Local search on a walk: a stream of small proposals, none of which needs a distance.
+"""Local search on a walk: a stream of small proposals that need no distances between cells.
 
 ============  =================================================  ==============
 move          what it does                                       steps
 ============  =================================================  ==============
 square flip   steps a-b and c-d become a-c and b-d, the part     0
               between is reversed (2-opt on a square)
-end flip      the part behind a step a-b is reversed, where the  0
+end flip      the part after a step a-b is reversed, where the   0
               free end lies beside a
 corner flip   a spare visit moves to the opposite corner of its  0
               square
@@ -112,7 +112,7 @@ def _drop_end(state: _State) -> None:
 
 @inlined
 def _drop_spike(state: _State, index: int) -> None:
-    """Leave out visit ``index`` between two visits of one cell, and the second of these."""
+    """Leave out visit ``index`` between two visits of one cell, and the second of the two."""
     walk, turn = state.walk, state.prices.quarter_turn_us
     delta = -2 * state.prices.step_us
     delta -= 2 * added(state.ground, state.prices, walk.cells[index - 1], walk.cells[index])
@@ -124,7 +124,7 @@ def _drop_spike(state: _State, index: int) -> None:
 
 @inlined
 def _added_by(state: _State, first: int, last: int) -> int:
-    """Return what is added to the prices of the steps from visit ``first`` to ``last`` [us]."""
+    """Return the additional prices of the steps from visit ``first`` to ``last`` [us]."""
     total, cells = 0, state.walk.cells
     for index in range(first, last):
         total += added(state.ground, state.prices, cells[index], cells[index + 1])
@@ -150,9 +150,9 @@ def _drop_detour(state: _State, index: int) -> None:
 
 @inlined
 def _takes_flip(state: _State, first: int, delta: int) -> bool:
-    """Return whether a change from visit ``first`` on of equal length is taken, and count it.
+    """Return whether a change of equal length is accepted, and count its cost.
 
-    Held visits change only for a gain.
+    Changes from a held visit on must gain.
     """
     if delta >= 0 and first < state.prices.held:
         return False
@@ -230,7 +230,7 @@ def _turns_of_flip(walk: Walk, first: int, last: int, turn: int) -> int:
 
 @inlined
 def _added_by_flip(ground: Ground, prices: Prices, walk: Walk, first: int, last: int) -> int:
-    """Return the change in what is added to steps if visits ``first + 1`` to ``last`` reverse."""
+    """Return the change in added prices of steps if visits ``first + 1`` to ``last`` reverse."""
     cells = walk.cells
     near, after, far = cells[first], cells[first + 1], cells[last]
     delta = added(ground, prices, near, far) - added(ground, prices, near, after)

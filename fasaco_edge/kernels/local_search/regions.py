@@ -1,11 +1,10 @@
 """Regions of a large ground: changed cells of a walk, and its parts cut out and put back.
 
-Each stretch of the walk outside becomes one jump in the region's own walk, between the
-border cells where it leaves and re-enters; jumps and those cells do not change
-(``needed`` is FIXED, no step leads there), so any improvement of the region's walk
-improves the whole one, and the whole one stays connected. When put back, the outside
-stretches are copied in the order and direction in which the region's walk now visits
-them.
+Each stretch of the walk outside of the region becomes one jump in the region's own walk, between
+the border cells where the walk leaves and re-enters. Jumps and border cells do not change
+(``needed`` is FIXED, no step leads there). So an improvement of the region's walk improves the
+whole walk, which stays connected. When the region is put back, the outside stretches are copied in
+the order and direction in which the region's walk now visits them.
 """
 
 from typing import NamedTuple
@@ -72,7 +71,7 @@ def neighbourhood(
     label: int,
     found: NDArray[np.int32],
 ) -> int:
-    """Label some cells, and those around them.
+    """Label some cells, and the cells around them.
 
     Args:
         ground: where they lie.
@@ -133,14 +132,14 @@ class RegionBox(NamedTuple):
 
 
 class Jumps(NamedTuple):
-    """The parts of the whole walk outside a region; jump i is cell ``bound + i`` of its walk.
+    """The parts of the whole walk outside a region; jump i is the region's cell ``bound + i``.
 
     Attributes:
         ends: int32 (jumps, 2), the cells of the region's ground a jump leads between.
         sections: int32 (jumps, 2), first and last visit of the whole walk that the jump
             stands for.
-        limits: int64 (2,): visits up to BEFORE come before the region's walk, those from
-            AFTER on come after it.
+        limits: int64 (2,): visits up to BEFORE come before the region's walk, visits from AFTER on
+            come after it.
     """
 
     ends: NDArray[np.int32]
@@ -207,8 +206,8 @@ def cut_walk(
         jumps: out.
 
     Returns:
-        Length of the region's walk and number of jumps; (0, 0) where the walk does not
-        come there or does not fit.
+        Length of the region's walk and number of jumps; (0, 0) if the walk does not enter the
+        region or does not fit.
     """
     bound, limits = _bound(box), jumps.limits
     length, made, visit = 0, 0, 0

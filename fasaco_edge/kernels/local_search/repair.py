@@ -1,4 +1,4 @@
-"""Repair of a walk after the ground changed: lost cells are left out, new ones put in.
+"""Repair of a walk after the ground changed: lost cells are left out, new cells are put in.
 
 A repaired walk is legal and complete, and unchanged where the ground is unchanged;
 local search improves it.
@@ -94,7 +94,7 @@ class _Wave(NamedTuple):
 
     Attributes:
         queue: int32 (n,), the cells reached, nearest first.
-        came_from: int32 (n,), the cell before each one reached, itself for the first ones.
+        came_from: int32 (n,), the cell before each one reached, itself for the first cells.
         way: int32 (n,), working memory.
     """
 
@@ -151,7 +151,7 @@ def _begin(wave: _Wave, visits: NDArray[np.int32], first: int, end: int, tail: i
 def _spread(
     ground: Ground, walk: _Walk, wave: _Wave, tail: int, over_all: bool, free_end: bool
 ) -> int:
-    """Visit missing cells in a wave from the queued ones; return the tail.
+    """Visit missing cells in a wave from the queued cells; return the tail.
 
     ``over_all``: over any cells, else only from one missing cell to the next.
     """
@@ -187,8 +187,7 @@ def put_in_new(
     the robot only if no way over missing cells leads to it from a later visit.
 
     Args:
-        ground: whose cells with ``needed`` above 0 are to be visited; those that cannot
-            be reached are left out.
+        ground: its cells with ``needed`` above 0 are to be visited; unreachable ones are left out.
         before: int32 (m,), the walk, m at least 1.
         free_end: whether the walk may end anywhere.
         held: number of first visits that lie just ahead of the robot.

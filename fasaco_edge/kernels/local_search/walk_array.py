@@ -3,7 +3,7 @@
 Cells are flat indices of a ground that is framed by two cells without any step,
 so that a neighbour is one addition away and never outside. Steps lead to a
 neighbour; a cell may be visited more than once. ``place`` holds the index of one
-visit of each cell, which may be out of date: it is checked before it is used.
+visit of each cell; the index may be out of date, so it is checked before use.
 
 A walk of this form stays connected through every change, and needs no distances:
 a transfer is a run of cells that are also visited elsewhere.
@@ -19,14 +19,14 @@ from fasaco_edge.kernels.lattice.reach import walk_cost
 
 LENGTH, SPARE_CELLS, COST = 0, 1, 2
 
-# Cells that no change may touch: more visits than any walk has.
+# In ``needed``, for cells that no change may touch: more visits than any walk has.
 FIXED = 1 << 30
 
 # Width of the frame [cells].
 FRAME = 2
 
-# First bit of a cell's step mask that says, for each direction, that the step there leads into
-# another room.
+# First bit of a cell's step mask for rooms: set if the step in that direction leads into another
+# room.
 ROOM_BIT = 4
 ROOM_BITS = 0b1111 << ROOM_BIT
 
@@ -91,7 +91,7 @@ class Prices(NamedTuple):
 
 @inlined
 def copy(source: NDArray[np.int32], target: NDArray[np.int32], length: int) -> None:
-    """Copy the first visits; a slice would ask whether the two arrays overlap, and allocate."""
+    """Copy the first visits; a slice would test whether the two arrays overlap, and allocate."""
     for index in range(length):
         target[index] = source[index]
 
@@ -119,12 +119,12 @@ def axis_of(one: int, other: int) -> int:
 
 @inlined
 def added(ground: Ground, prices: Prices, one: int, other: int) -> int:
-    """Return what is added to the price of a step between two cells [us]."""
+    """Return the additional price of a step between two cells [us]."""
     axis = axis_of(one, other)
     price = prices.col_us if axis else prices.row_us
     if prices.room_us:
         way = ROOM_BIT + axis + 2 * (other < one)
-        # One of the two may lie at the rim of a region, and has no mask there.
+        # One of the cells may lie at the rim of a region, and has no mask there.
         if (ground.steps[one] >> way | ground.steps[other] >> (way ^ 2)) & 1:
             price += prices.room_us
     return price
@@ -184,7 +184,7 @@ def recount(ground: Ground, walk: Walk, length: int, prices: Prices) -> None:
 
 @inlined
 def is_at(walk: Walk, cell: int, index: int) -> bool:
-    """Return whether the walk's visit ``index``, any number, is one of ``cell``."""
+    """Return whether visit ``index`` of the walk, if it exists, is a visit of ``cell``."""
     return bool(0 <= index < walk.counts[LENGTH] and walk.cells[index] == cell)
 
 

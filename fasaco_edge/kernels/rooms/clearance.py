@@ -2,7 +2,7 @@
 
 P. Felzenszwalb and D. Huttenlocher, "Distance transforms of sampled functions", Theory of
 Computing 8, 2012: distances along columns first, then the lower envelope of parabolas along each
-row. All in integers, thus equal on all machines.
+row. All numbers are integers, so results are equal on all machines.
 """
 
 import numpy as np
@@ -53,10 +53,10 @@ def _envelope(ways: NDArray[np.int32], at: NDArray[np.int32], begins: NDArray[np
 
 @kernel
 def clearances(solid: NDArray[np.bool_], most: int) -> NDArray[np.int32]:
-    """Return the squared distance of each pixel's centre to that of the nearest solid pixel.
+    """Return the squared distance of each pixel's centre to the nearest solid pixel's centre.
 
-    int32 (rows, cols) [pixels^2], 0 for solid pixels, at most ``most`` squared. What lies beyond
-    the rim is solid.
+    int32 (rows, cols) [pixels^2], 0 for solid pixels, at most ``most`` squared. Pixels beyond the
+    rim count as solid.
 
     Args:
         solid: bool (rows, cols).

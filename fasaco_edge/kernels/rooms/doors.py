@@ -2,8 +2,8 @@
 
 A door is a short chord across free pixels, from jamb to jamb, beyond which the free space widens on
 both sides. A jamb is the end of a wall that continues along the chord: thin across it, with free
-pixels on both sides. Where the far side has not been seen yet, the near side has to do. Beside one
-such jamb the other may be a corner or the side of a cabinet.
+pixels on both sides. If the far side has not been seen yet, the near side suffices. The other jamb
+may also be a corner or the side of a cabinet.
 
 The mouth of a passage separates rooms as a door does, although its jambs are corners: on one side
 the gap stays as narrow, and on the other the free space widens by much.
@@ -19,24 +19,24 @@ from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
 # Kinds of jambs, the better the higher: no wall; thick, or a corner; thin as far as it has been
 # seen; thin.
 NONE, THICK, HALF_SEEN, THIN = 0, 1, 2, 3
-# Depth of a jamb that is looked at [pixels], and how much of it must be occupied.
+# Depth of a jamb that is examined [pixels], and how much of it must be occupied.
 DEPTH, LEAST_MARKS = 4, 3
-# Walls are looked for along the chord, and a little aside of it and turned, as it may run from edge
-# to edge of two jambs [1, pixels].
+# A chord may run from edge to edge of two jambs. So walls are also sought along lines that are
+# turned by this slope, or shifted aside [pixels].
 TURN, ASIDE = 0.2, 1.0
-# How much further the face of a wall along the chord may be a pixel deeper [pixels].
+# Largest change of a jamb's half thickness from one pixel of depth to the next [pixels].
 ASLANT = 1.2
 # Least sum of the kinds of both jambs: a thin one beside a corner, or two half seen.
 LEAST_SURE = THIN + THICK
 # How far a chord's middle may be from the middle of the gap [pixels].
 OFF_CENTRE = 2.0
-# Ratio of the squared clearances to that in the mouth of a passage: in the passage at most, and
-# before the mouth at least, within the passage's width. Where two passages cross, it is 2.
+# Squared clearance relative to that in the mouth of a passage: at most EVEN in the passage, at
+# least MOUTH before it, within the passage's width. Where two passages cross, it is 2.
 EVEN, MOUTH = 1.3, 4.0
-# Ratio of the squared clearances beside a door to that in it: of the wider side, of the other side,
-# and of the other side if it is half seen.
+# Squared clearance beside a door relative to that in the door: least ratio on the wider side, on
+# the other side, and on the other side if that is half seen.
 WIDER, OTHER, OTHER_HALF_SEEN = 1.32, 1.1, 0.8
-# Gaps looked at: one pixel of each gap is enough.
+# Limit on the gaps that are examined: one pixel of each gap is enough.
 MOST_GAPS = 20_000
 
 
@@ -57,13 +57,13 @@ class RoomPixels(NamedTuple):
 
 
 class DoorLimits(NamedTuple):
-    """What a door measures at most.
+    """Limits on the size of a door.
 
     Attributes:
         width: of a door [pixels].
         wall: thickness of a wall with a door [pixels].
-        reach: how far beside a door the free space is looked at [pixels].
-        passage: length of a passage behind its mouth, the least [pixels].
+        reach: distance beside a door in which the free space is examined [pixels].
+        passage: least length of a passage behind its mouth [pixels].
     """
 
     width: float
@@ -114,7 +114,7 @@ def _way(solid: NDArray[np.bool_], place: _Place, most: float) -> float:
 def _face(pixels: RoomPixels, place: _Place, most: float) -> float:
     """Return how far a wall reaches from a place inside it, in the place's direction [pixels].
 
-    Negative if what begins there has not been seen, 0 if it is further than ``most``.
+    Negative if the wall ends at unseen pixels, 0 if it reaches further than ``most``.
     """
     way = 0.5
     while way <= most:
@@ -130,9 +130,9 @@ def _face(pixels: RoomPixels, place: _Place, most: float) -> float:
 
 @lean_inner_kernel
 def _nearest_solid(pixels: RoomPixels, row: float, col: float) -> tuple[int, int, bool]:
-    """Return the solid pixel at a point, or the nearest beside it, and whether one is occupied.
+    """Return the solid pixel at a point, or the nearest beside it, and whether any is occupied.
 
-    The row is -1 without one.
+    The row is -1 if no pixel is solid.
     """
     at_row, at_col = int(np.floor(row)), int(np.floor(col))
     found_row, found_col, is_wall, nearest = -1, -1, False, 9.0
@@ -244,7 +244,7 @@ def _door_at(
     limits: DoorLimits,
     door: NDArray[np.float64],
 ) -> bool:
-    """Fill in the door through a pixel, as a row of ``find_doors``; return whether it is one."""
+    """Fill in the door through a pixel, as a row of ``find_doors``; return whether there is one."""
     row, col = centre[0] + 0.5, centre[1] + 0.5
     shortest, ahead, chord = limits.width, 0.0, -1
     for number in range(len(directions)):
@@ -296,14 +296,14 @@ def find_doors(
 ) -> NDArray[np.float64]:
     """Return the chords of all doors and mouths of passages, several of each, float64 (n, 5).
 
-    Each is row and column of its first end and of its last [pixels], and how certain it is: the sum
-    of the kinds of its jambs, at least LEAST_SURE for a door.
+    A row holds row and column of the first end and of the last end [pixels], and the certainty of
+    the door: the sum of the kinds of its jambs, at least LEAST_SURE.
 
     Args:
         pixels: what the pixels are.
         middles: pixels through which chords are looked for, bool (rows, cols).
         directions: of the chords, unit vectors (row, col), float64 (m, 2), over half a turn.
-        limits: what a door measures.
+        limits: on the size of a door.
     """
     rows, cols = pixels.solid.shape
     most = int((limits.width / 2 + 1) ** 2)

@@ -18,8 +18,8 @@ class FurnitureLimits(NamedTuple):
     """Which islands are furniture.
 
     Attributes:
-        longest: longest edge of the box around it [pixels].
-        small: with a box of a shorter diagonal than this, it is furniture [pixels].
+        longest: longest edge of the box around furniture [pixels].
+        small: an island is furniture if its box has a shorter diagonal than this [pixels],
         thick: or if its area divided by that diagonal is larger than this [pixels].
     """
 

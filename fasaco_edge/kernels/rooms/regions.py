@@ -1,4 +1,4 @@
-"""Regions of free pixels between cuts: the cuts drawn, what lies beside them, and growth."""
+"""Regions of free pixels between cuts: drawing of cuts, labels beside them, growth of labels."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels import COL_STEP, ROW_STEP
 from fasaco_edge.kernels.jit import kernel, lean_kernel
 
-# How far beside a cut the region next to it is looked for [pixels].
+# Largest distance beside a cut at which the region next to it is sought [pixels].
 BESIDE = 8
 
 
@@ -18,7 +18,7 @@ def draw_cuts(kinds: NDArray[np.uint8], cuts: NDArray[np.float64], longer: float
     Args:
         kinds: uint8 (rows, cols).
         cuts: row and column of both ends, float64 (n, >= 4) [pixels].
-        longer: what a segment is extended by at each end [pixels].
+        longer: length added to a segment at each end [pixels].
     """
     rows, cols = kinds.shape
     for number in range(len(cuts)):

@@ -7,8 +7,7 @@ method (2016), here for a walk that may visit a cell more than once:
 * A walk is taken apart into passages (``passages``). A step is walked at most twice, so each of the
   four sides of a cell has two lanes. A passage enters a cell by a lane and leaves it by another.
 * The cells of the window are decided one by one, line by line (``window``): for each cell its
-  passages are chosen (``choices``). The frontier is the border between the cells that are decided
-  and those that are not.
+  passages are chosen (``choices``). The frontier is the border between decided and undecided cells.
 * The passages chosen so far form pieces of the walk. A state (``states``) is what the undecided
   cells need to know of them: which lanes at the frontier and at the window's rim are open ends, and
   for each open end its mate, the other end of the same piece. The walk outside the window joins the
@@ -18,7 +17,7 @@ method (2016), here for a walk that may visit a cell more than once:
   drops some.
 * A passage that joins the two ends of one piece closes a ring. That is allowed once, for the last
   passage: then one ring is left, which is the walk (closed outside of the ground, from its end to
-  its begin).
+  its beginning).
 * States that cannot cover the rest (``parts``), or cannot become cheaper than the present walk, are
   dropped. The passages of the cheapest last state are put back into the walk (``program``).
 

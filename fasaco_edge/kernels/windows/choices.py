@@ -78,7 +78,7 @@ def price_cells(
     random: NDArray[np.uint64],
     may_end: bool,
 ) -> tuple[int, int]:
-    """Write the cells' reduced costs; return the present cost by them, and the last needed cell."""
+    """Write the reduced costs; return the present walk's reduced cost, and the last needed cell."""
     now, last = 0, -1
     for index in range(count):
         cell = program.cells.listed[index]
@@ -186,7 +186,7 @@ def _sort(keys: NDArray[np.int64], size: int) -> None:
 
 @inlined
 def _added(ground: Ground, terms: WalkPrices, cell: int, side: int) -> int:
-    """Return what is added to half a step through a side; nothing at the walk's ends."""
+    """Return the additional price of half a step through a side; nothing at the walk's ends."""
     if side >= WALK_BEGINS:
         return 0
     price = terms.col if side & 1 else terms.row

@@ -17,7 +17,7 @@ from fasaco_edge.kernels.jit import inlined
 NO_END = -1
 TOO_MUCH = 1 << 60
 
-# Limit on the identifiers of a state; windows that need more are left alone.
+# Limit on the identifiers of a state; windows that need more are not solved.
 MOST_IDS = 192
 # Limit on the choices for a cell, and number of kinds of incoming sides with a list of choices.
 MOST_CHOICES, KINDS = 600, 18
@@ -36,13 +36,13 @@ class Choices(NamedTuple):
     """A cell's choices by kind of incoming sides, cheapest first.
 
     Attributes:
-        listed: int32 (KINDS,), their number; -1 if they are not listed yet.
+        listed: int32 (KINDS,), number of choices; -1 if they are not listed yet.
         keys: int64 (KINDS, MOST_CHOICES): cost, and in the lowest CODE_BITS the code: lanes ahead,
-            lanes below, whether it ends, pairing.
+            lanes below, whether the walk ends here, pairing.
         named: int32 (KINDS,), number of choices whose ends are listed in ``ends``.
         ends: int16 (KINDS, MOST_CHOICES, 2 * MOST_PAIRS), identifiers that are paired up.
         new_ends: uint8 (KINDS, MOST_CHOICES, MOST_PAIRS), which of the two are new: FIRST_NEW,
-            SECOND_NEW, both or neither; NO_PAIR behind the last one.
+            SECOND_NEW, both or neither; NO_PAIR after the last pair.
     """
 
     listed: NDArray[np.int32]
@@ -223,8 +223,8 @@ class EndRules(NamedTuple):
     """The walk's ends and ring rules at a cell.
 
     Attributes:
-        begin_id: identifier of the walk's begin if it is in this cell, else -1.
-        end_id: of its end if that is in the window, else -1.
+        begin_id: identifier of the walk's beginning if it is in this cell, else -1.
+        end_id: identifier of the walk's end if that is in the window, else -1.
         is_needed: whether the cell must have a passage.
         may_close: whether a ring may close: no later cell needs a passage, or several rings may.
         ring_price: price of each ring except the first; 0 if there must be one.

@@ -1,9 +1,9 @@
 """Connected parts of the undecided cells of a window, and states that can no longer cover them.
 
 A walk that enters a part leaves it again, or ends there. So an even number of open ends leads into
-each part; into one part an odd number may lead if the walk may end there. At least one leads into
-each part with a cell to cover; none has to if the part may have a ring, a closed walk, of its own.
-States that break these rules are dropped.
+each part; into one part an odd number may lead if the walk may end there. At least one open end
+leads into each part with a cell to cover, unless the part may have a ring of its own, a closed
+walk. States that break these rules are dropped.
 """
 
 import numpy as np
@@ -79,7 +79,7 @@ def label_parts(
 
 @inlined
 def leads_to(parts: Parts, identifier: int, cell: int) -> None:
-    """Note that the end with an identifier leads into the part of a cell."""
+    """Note that the end ``identifier`` leads into the part of a cell."""
     parts.leads[parts.sizes[LEADS], 0] = identifier
     parts.leads[parts.sizes[LEADS], 1] = parts.label[cell]
     parts.sizes[LEADS] += 1
@@ -89,7 +89,7 @@ def leads_to(parts: Parts, identifier: int, cell: int) -> None:
 def list_rim(
     parts: Parts, rim: NDArray[np.int32], number: int, first: int, ids: int, is_free: bool
 ) -> None:
-    """Note which part the ends at the rim lead into, for cells after the one of ``number``."""
+    """Note which part the ends at the rim lead into, for the cells after ``number``."""
     for identifier in range(first, ids):
         cell = rim[identifier, 0]
         if is_free and rim[identifier, 1] == END:
@@ -103,7 +103,7 @@ def is_stuck(parts: Parts, state: NDArray[np.int16], is_open: bool, may_ring: bo
     """Return whether a state cannot cover the remaining cells.
 
     Args:
-        parts: of these cells.
+        parts: connected parts of the remaining cells.
         state: int16 (MOST_IDS,), the mate of each identifier; NO_END if there is no open end.
         is_open: whether the walk may end in any remaining cell.
         may_ring: whether a part of two cells or more may have a ring of its own.

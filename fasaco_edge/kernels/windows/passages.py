@@ -25,7 +25,7 @@ class Passages(NamedTuple):
     """The passages of a walk over a framed ground of n cells.
 
     Attributes:
-        partner: int8 (n, 10), the slot that each slot is joined with; NONE for those not used.
+        partner: int8 (n, 10), the slot that each slot is joined with; NONE for unused slots.
         ends: int64 (2,), the cells that the walk begins and ends in.
     """
 

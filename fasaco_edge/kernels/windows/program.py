@@ -1,4 +1,4 @@
-"""Dynamic program over a window, see ``kernels.windows``: begin, lines of cells, and result.
+"""Dynamic program over a window, see ``kernels.windows``: its begin, lines of cells, and result.
 
 Costs are reduced by the prices of steps (``kernels.bound.turns``): no passage has a negative
 reduced cost, so the undecided cells cost at least the sum of their cheapest passages, and states
@@ -170,7 +170,7 @@ def advance_window(
 def end_window(
     ground: Ground, passages: Passages, terms: WalkPrices, window: WalkWindow, program: Program
 ) -> int:
-    """Put the best state's passages back, if it is better.
+    """Put the best state's passages back, if they cost less.
 
     Returns:
         The change of the walk's cost [half us], 0 for none.

@@ -4,7 +4,7 @@ Source: Shaw, "Using constraint programming and local search methods to solve ve
 problems", 1998, for the scheme: a part is freed, the rest is fixed, and the part is re-optimised.
 
 The solution of a whole ground with few states consists of several rings. A small window over the
-seam of two, re-optimised for one ring, joins them at the least cost.
+seam of two rings, re-optimised for one ring, joins them at the least cost.
 """
 
 from typing import NamedTuple
@@ -146,8 +146,8 @@ def solve_windows(
         aim: positions and sizes of windows.
         seams: memory to join rings at any price; without any, windows lie anywhere.
         tally: int64 (4,), COST, BEST, SOLVED, SWEPT; changed in place.
-        windows: limit on the windows: one without a possible gain expands no state.
-        expansions: states to expand at least.
+        windows: limit on the windows, as one without a possible gain expands no state.
+        expansions: expanded states after which to stop.
         random: state of the stream, uint64 (1,).
 
     Returns:

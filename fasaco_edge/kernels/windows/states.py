@@ -1,4 +1,4 @@
-"""States of the program: a choice applied to a state, equal states, the most expensive dropped."""
+"""States of the program: apply a choice, merge equal states, drop the most expensive ones."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ def _name(
     lanes: int,
     first: int,
 ) -> int:
-    """Append the identifiers of a side to ``taken``: from ``first`` on; -1 for those at the rim."""
+    """Append a side's identifiers to ``taken``, from ``first`` on; for -1, those at the rim."""
     for lane in range(lanes):
         at_rim = ident[cell, 2 * direction + lane]
         taken[size + lane] = at_rim if first < 0 else first + lane
@@ -161,7 +161,7 @@ def order_lanes(mates: NDArray[np.int16], first: int) -> int:
 def _hash(state: NDArray[np.int64], words: int) -> int:
     """Return the hash of a state: its highest bits depend on the whole state."""
     one, other = 1469598103934665603, 6148914691236517205
-    # Two chains: each multiplication waits for the last one.
+    # Two independent chains, as each multiplication waits for the one before it.
     for word in range(0, words, 2):
         one = (one ^ state[word]) * -7046029254386353131
         other = (other ^ state[word + 1]) * -4417276706812531889

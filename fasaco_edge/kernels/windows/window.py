@@ -42,7 +42,7 @@ class WindowSizes(NamedTuple):
         rows, cols: of the framed ground.
         frame: cells of its frame on each side.
         least_side, most_side: of a window's shorter side.
-        least_area, most_area: of a window at first, and in the end.
+        least_area, most_area: area of a window at first, and in the end.
         beam: limit on the states kept.
     """
 

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.core.parts import MissionParts
-from fasaco_edge.mission.events import Doing, PathUpdate, State
+from fasaco_edge.mission.events import Doing, PathUpdate
 from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.path.route import NO_CELLS
+from fasaco_edge.states import State
 
 # An errand ends this long after the robot enters the last cell [s]. Meanwhile the robot drives to
 # the centre of the cell and turns.

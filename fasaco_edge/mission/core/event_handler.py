@@ -188,7 +188,6 @@ class EventHandler:
         if self.map.grid is None or not self.map.building.update(self._now):
             return
         misfit = self.ledger.begin_elsewhere(self.map.grid.frame)
-        self.company.forget_ground()
         self._record_again()
         self._change_building(misfit)
 
@@ -216,9 +215,6 @@ class EventHandler:
         is_other_map = self.map.switch_frame()
         before = self.ledger.current.frame
         misfit = self.ledger.move_to(frame)
-        if before not in ("", frame):
-            # The ledger also forgets the cells that other robots swept there.
-            self.company.forget_ground()
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no longer in {before!r}"
             self.changes.begin_order(self.orders.order_state.in_other_frame(why))

@@ -11,8 +11,9 @@ from fasaco_edge.mission.core.order_work import OrderWork
 from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.core.path_checks import PathChecks
 from fasaco_edge.mission.core.trouble import DRIVING, Troubles
-from fasaco_edge.mission.events import Decision, Doing, PathUpdate, State
+from fasaco_edge.mission.events import Decision, Doing, PathUpdate
 from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.states import State
 
 # States in which the robot rests: by command, at the end of its order, or to charge.
 STOPPED = frozenset((State.PAUSED, State.IDLE, State.DONE, State.CHARGING))

@@ -16,6 +16,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.core.company_kind import ALONE, CompanyKind
+from fasaco_edge.mission.core.drive_meter import DriveMeter
 from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.executive import Executive
 from fasaco_edge.mission.core.lattice_layout import LatticeLayout
@@ -23,7 +24,6 @@ from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.parts import Lasting, laid_parts
 from fasaco_edge.mission.core.trouble import Trouble
 from fasaco_edge.mission.coverage.counts import Coverage
-from fasaco_edge.mission.coverage.drive_meter import DriveMeter
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
 from fasaco_edge.mission.events import (
@@ -33,7 +33,6 @@ from fasaco_edge.mission.events import (
     PathUpdate,
     PoseReceived,
     PriorityReceived,
-    State,
 )
 from fasaco_edge.mission.map.placing import restored
 from fasaco_edge.mission.rooms.room_book import RoomBook
@@ -41,6 +40,7 @@ from fasaco_edge.mission.rooms.room_watch import RoomWatch
 from fasaco_edge.mission.work.idle_places import IdlePlaces
 from fasaco_edge.mission.work.order_state import OrderState, Stage
 from fasaco_edge.planners.living_trail import LivingTrail
+from fasaco_edge.states import State
 
 __all__ = ["Mission", "MissionConfig"]
 

@@ -8,8 +8,9 @@ from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.errands import NO_WAY, Errands
 from fasaco_edge.mission.core.parts import MissionParts
-from fasaco_edge.mission.events import Doing, State
+from fasaco_edge.mission.events import Doing
 from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.states import State
 
 
 class OrderWork:
@@ -63,8 +64,11 @@ class OrderWork:
         if why := orders.part.why_looking(cell, now):
             return self._stand_by(why, now)
         if self.line.left.open_missed():
+            if why := self.line.left.share.why:
+                route.requests.want(why)
             return None
-        if orders.part.pass_over_unreachable():
+        if area is not None and orders.cells.pass_over(area):
+            # Cells of others come before a retry.
             self.share(cell, now, at_once=True)
             return None
         return self._next_stage(cell, now)
@@ -101,7 +105,7 @@ class OrderWork:
         """Divide the remaining cells if due; return why a plan is wanted, or ""."""
         if self.orders.order_state.stage is Stage.RETURNING:
             return ""
-        return self.company.share(self.orders.cells.open_cells, cell, now, at_once=at_once)
+        return self.company.share(self.orders.cells.untried, cell, now, at_once=at_once)
 
     def _stand_by(self, reason: str, now: float) -> Doing:
         return Doing(State.COVERING, reason, self.route.stop(reason, now))

@@ -8,12 +8,12 @@ from fasaco_edge.mission.company import Company, Waiting
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
 from fasaco_edge.mission.core.company_kind import ALONE, CompanyKind
+from fasaco_edge.mission.core.drive_meter import DriveMeter
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.standing import BlockedFollower, Standing
 from fasaco_edge.mission.core.time_limit import TimeLimit
 from fasaco_edge.mission.core.way_out import WayOut
-from fasaco_edge.mission.coverage.drive_meter import DriveMeter
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.line.layer import LineLayer

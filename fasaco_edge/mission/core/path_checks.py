@@ -24,13 +24,18 @@ class PathChecks:
         self._route, self._line, self._standing = parts.route, parts.line, parts.standing
         self._company = parts.company
         self._orders.describe_floor_by(self._sum_up)
-        self._worth_at = self._timed_at = float("-inf")
+        self._worth_at = self._timed_at = self._homeward_at = float("-inf")
+        # The number of plans at the last path that was found to lead only home.
+        self._homeward = -1
         # Number of covered cells, and when it was counted [s], while poses are too far apart.
         self._progress: tuple[int, float] | None = None
 
     def check(self, cell: Cell, now: float, *, is_covering: bool) -> None:
         """Check the path of a robot in ``cell``."""
-        while_covering = (self._check_worth, self._check_time, self._check_room)
+        while_covering = (
+            *(self._check_worth, self._check_time, self._check_room),
+            self._check_way_home,
+        )
         for check in (self._check_deviation, *(while_covering if is_covering else ())):
             if self._route.requests.pending is not None or self._route.requests.wanted:
                 return
@@ -67,7 +72,7 @@ class PathChecks:
         elif self._orders.part.record_path_end(why):
             self._orders.advance(now)
         else:
-            self._route.requests.want("cells left over")
+            self._route.requests.want(self._line.left.share.why or "cells left over")
 
     def _drives_in_vain(self, now: float) -> bool:
         """Return whether poses are too far apart to cover new cells, so that no path would end."""
@@ -105,6 +110,18 @@ class PathChecks:
         """Ask for a new plan if new rooms show that the robot has another room to finish first."""
         if self._orders.scope.is_in_other_room(cell):
             self._route.requests.want("rooms have changed: another room first")
+
+    def _check_way_home(self, _: Cell, now: float) -> None:
+        """Ask for a new plan for the missing floor of a share before the path leads home."""
+        orders, plans, share = self._orders, self._route.requests.plans, self._line.left.share
+        is_due = share.share is not None and orders.order_state.returns_home_next
+        if not is_due or plans == self._homeward or now - self._homeward_at < WORTH_S:
+            return
+        self._homeward_at = now
+        if not orders.cells.left():
+            self._homeward = plans
+            if self._line.left.open_missed():
+                self._route.requests.want(share.why)
 
     def _check_time(self, _: Cell, now: float) -> None:
         """Ask for a new plan with the most worthwhile floor first if time or battery do not suffice

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fasaco_edge.mission.core.in_dock import DockCurrent
 from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.core.path_checks import FAR_APART
-from fasaco_edge.mission.events import State
+from fasaco_edge.states import TROUBLED, Activity, State, states_of
 from fasaco_edge.text import percent
 
 # Least timeout of poses at rest [s]; timeout of the first map and of the first pose [s].
@@ -22,9 +22,9 @@ REST_S = 30.0
 IMPOSSIBLE_S = 20.0
 
 # States of a robot that drives, or soon will.
-DRIVING = frozenset((State.PLANNING, State.COVERING, State.RETURNING))
+DRIVING = states_of(Activity.DRIVING) - TROUBLED
 # States of a mission under way. In other states the robot may be switched off.
-UNDER_WAY = frozenset(State) - {State.IDLE, State.DONE}
+UNDER_WAY = states_of(Activity.STARTING)
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,12 +20,13 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
-from fasaco_edge.mission.events import Doing, State
+from fasaco_edge.mission.events import Doing
 from fasaco_edge.mission.line.way import LEAST_SHARE, fitting_radius, is_clear_between
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.work.sequencer import Sequencer
+from fasaco_edge.states import State
 
 # Length of the track that is kept, and spacing of its points [m].
 TRACK_M, SPACING_M = 40.0, 0.05

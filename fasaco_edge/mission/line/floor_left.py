@@ -22,6 +22,7 @@ from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.coverage.floor_tiles import pixels_under
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFloor
+from fasaco_edge.mission.line.asked_share import AskedShare, nearest_stands
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.unswept import causes_of
 from fasaco_edge.mission.map.map_state import MapState
@@ -34,9 +35,9 @@ LEAST_LEFT_M2 = 0.04
 # is worth WORTH_S [s]. With each cell passed, CHECKED_CELLS held cells are checked. The robot does
 # not return to them: with four robots, returns took 10 % more time, and swept 0.1 % more floor.
 WORTH_S, RIM_M, CHECKED_CELLS = 4.0, 0.1, 24
-# The robot returns for missed floor if it is more than this share of the floor asked for: the base
-# may have driven beside its line, or poses may be rare. On the map of a real scan matcher, returns
-# for less took an eighth more time and swept only 0.3 % more floor.
+# Without a given share, the robot returns for missed floor if it is more than this share of the
+# floor asked for: the base may have driven beside its line, or poses may be rare. On the map of a
+# real scan matcher, returns for less took an eighth more time and swept only 0.3 % more floor.
 LEAST_MISSED = 0.05
 # Least unswept floor that is reported at the end [m2]: less would be rounded to 0.
 LEAST_REPORTED_M2 = 0.05
@@ -67,7 +68,11 @@ class FloorToSweep(NamedTuple):
 
 class UnsweptTally:
     """Keeps the tally of the line up to date with map, order and ledger; inactive without a floor,
-    when only cells are counted."""
+    when only cells are counted.
+
+    Attributes:
+        share: the share of the floor that is asked for.
+    """
 
     def __init__(
         self,
@@ -80,6 +85,7 @@ class UnsweptTally:
         self._speed_m_s = sweeping.line.speed_m_s if sweeping else 0.0
         self._price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
         self._worth_m2 = WORTH_S / self._price_s_m2 if self._price_s_m2 else math.inf
+        self.share = AskedShare(sweeping.line.swept if sweeping else None)
         self._tally: SweepTally | None = None
         # Window in which causes of unreachable floor may be outdated.
         self._unexplained: Window | None = None
@@ -144,14 +150,17 @@ class UnsweptTally:
         found = self.areas
         if found is None:
             return ""
+        assert self._tally is not None
+        of_share = self.share.sum_up(self._tally)
         possible = max(self._possible_m2 or 0.0, found.asked_m2)
         left_m2 = found.ahead_m2 + found.left_m2 + found.passed_m2
         if left_m2 + possible - found.asked_m2 < LEAST_REPORTED_M2:
-            return ""
+            return of_share
         swept = f"; {found.asked_m2 - left_m2:.1f} of {found.asked_m2:.1f} m2 of floor swept"
         if possible - found.asked_m2 < LEAST_REPORTED_M2:
-            return swept
-        return f"{swept}, or of {possible:.1f} m2 if walls are a pixel thinner than on the map"
+            return swept + of_share
+        thinner = f", or of {possible:.1f} m2 if walls are a pixel thinner than on the map"
+        return swept + thinner + of_share
 
     def pass_cells(self, passed: NDArray[np.int32]) -> None:
         """Note cells that the robot has passed on its path, int32 (n, 2)."""
@@ -194,7 +203,8 @@ class UnsweptTally:
                 kept.drop(cell)
 
     def open_missed(self) -> bool:
-        """Reopen covered cells if their missed floor is worth the drive; return whether any is.
+        """Reopen covered cells if their missed floor is worth the drive, or if less than the share
+        asked for is swept; return whether any is reopened.
 
         To be called at the end of a path, as the robot may have driven beside its line.
         """
@@ -205,13 +215,15 @@ class UnsweptTally:
         if self._asked is None:
             return False
         window, asked, _ = self._asked
-        points = raster_to_map(floor.geometry, tally.missed().astype(np.float64))
+        is_covered = asked & (self._ledger.current.visits(window) > 0)
+        missed = tally.missed().astype(np.float64)
+        points = raster_to_map(floor.geometry, missed)
+        at = np.floor(points[:, ::-1] / lattice.cell_m).astype(np.int32)
+        if self.share.share is not None:
+            return self._return_for_share(nearest_stands(missed, at, floor, is_covered))
         if len(points) * tally.unit_m**2 < LEAST_MISSED * tally.wanted_m2:
             return False
-        found, pixels = np.unique(
-            np.floor(points[:, ::-1] / lattice.cell_m).astype(np.int32), axis=0, return_counts=True
-        )
-        is_covered = asked & (self._ledger.current.visits(window) > 0)
+        found, pixels = np.unique(at, axis=0, return_counts=True)
         through_s = lattice.cell_m / self._speed_m_s
         is_worth = self._price_s_m2 * pixels * tally.unit_m**2 > through_s
         kept = is_worth & window.values_at(is_covered, found, 0).astype(np.bool_)
@@ -219,6 +231,32 @@ class UnsweptTally:
         again = [cell for cell in cells if self._ledger.may_open_again(cell)]
         self._ledger.open_again(again)
         return bool(again)
+
+    def _return_for_share(self, at: NDArray[np.int32]) -> bool:
+        """Reopen cells for the share asked for; return whether any is.
+
+        ``at``: int32 (n, 2), a cell for each missed pixel.
+        """
+        assert self._tally is not None
+        self._begin_part()
+        found, pixels = np.unique(at, axis=0, return_counts=True)
+        may_open = [self._ledger.may_open_again((row, col)) for row, col in found.tolist()]
+        again = self.share.returns_to(self._tally, found[may_open], pixels[may_open])
+        if again:
+            self._ledger.open_again(again)
+        return bool(again)
+
+    def _begin_part(self) -> None:
+        state = self._orders.order_state
+        # A reset or another building makes another object of the swept floor.
+        self.share.begin((self._ledger.floor, state.order, state.zone, state.pass_number))
+
+    @property
+    def price_factor(self) -> float:
+        """Factor on the price of floor on a complete map."""
+        assert self._tally is not None
+        self._begin_part()
+        return self.share.factor(self._tally)
 
     def _explain(self) -> None:
         """Update the causes of unreachable floor where they may have changed."""

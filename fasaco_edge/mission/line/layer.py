@@ -141,6 +141,7 @@ class LineLayer:
                 ahead.stop()
             else:
                 self._lay(ahead, update.cells, stamped.pose)
+                update = self._with_price(update, ahead)
         elif self._is_dropped or (is_further and touched is not None):
             self._lay(ahead, path.ahead, stamped.pose)
             if len(path.ahead):
@@ -166,7 +167,10 @@ class LineLayer:
         # A way is not polished, as the robot does not sweep along it.
         if may_change and is_driven and not self._is_way:
             held = max(held, ahead.line.first_below(CURVED)) if self._curver else held
-            self._polisher.polish(ahead, self._map.ground.floor, held, is_settled=self._is_settled)
+            factor = self.left.price_factor if self._is_settled else 1.0
+            self._polisher.polish(
+                ahead, self._map.ground.floor, held, factor, is_settled=self._is_settled
+            )
             self._publication.compare(ahead)
         if self._curver is None:
             return self._publication.finish(ahead, update, reason, now, is_way=self._is_way)
@@ -175,6 +179,14 @@ class LineLayer:
         if update is None or update.xy is None:
             return update
         return replace(update, yaw=self._curver.yaw(update.xy, stamped.pose))
+
+    def _with_price(self, update: PathUpdate, ahead: LineAhead) -> PathUpdate:
+        """Return a path; if the robot returns for floor on it, with the time in its reason."""
+        share = self.left.share
+        if not share.why or update.reason != share.why or self._config is None:
+            return update
+        seconds = self._config.seconds(ahead.from_place(), ahead.tally.unit_m)
+        return replace(update, reason=share.priced(seconds))
 
     def _curve(self, curver: Curver, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> str:
         """Make the next curve if it is due; return why to publish a way at once, or ""."""

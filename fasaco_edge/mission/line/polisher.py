@@ -51,12 +51,15 @@ class Polisher:
 
     def __init__(self, config: LineConfig) -> None:
         self._config = config
+        self._factor = 1.0
         self._memory = memory_for_moves()
         self._random = np.array([SEED], np.uint64)
         # Index of the piece to be annealed next.
         self._at = 0
 
-    def polish(self, ahead: LineAhead, floor: FloorMap, held: int, *, is_settled: bool) -> None:
+    def polish(
+        self, ahead: LineAhead, floor: FloorMap, held: int, factor: float, *, is_settled: bool
+    ) -> None:
         """Polish the next piece of the line.
 
         On a map that still grows (``is_settled`` is False) annealing accepts only moves without a
@@ -66,10 +69,12 @@ class Polisher:
             ahead: the line.
             floor: the floor under it.
             held: how many of its first points stay as they are.
+            factor: factor on the price of floor.
             is_settled: whether the map is complete.
         """
         if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3:
             return
+        self._factor = factor
         begin = ahead.line.first_below(MOVED)
         if begin < len(ahead.line):
             lengths = ahead.lengths()
@@ -126,7 +131,8 @@ class Polisher:
         radius, tool = floor.discs.radius_m / unit, floor.discs.tool_m / 2 / unit
         clear = floor.discs.clear_m / unit
         on = kernel.Floor(floor.blocked, floor.places, ahead.tally.sweeps, radius, tool, clear)
-        return on, self._config.prices(unit, floor.discs.tool_m)
+        prices = self._config.prices(unit, floor.discs.tool_m)
+        return on, prices._replace(left_s=self._factor * prices.left_s)
 
     def _put(
         self, ahead: LineAhead, first: int, last: int, piece: Polyline, line: kernel.Line

@@ -23,10 +23,13 @@ from fasaco_edge.mission.work.exploration import frontier, is_in_reach
 from fasaco_edge.mission.work.present_order import PresentOrder
 from fasaco_edge.planners.passes import Covers, edge_cells, wanted_by
 
+NO_AREA = None, np.empty((0, 0), np.bool_)
+NO_CELLS = Window(0, 0, 0, 0), np.empty((0, 0), np.bool_)
+
 
 @dataclass(slots=True, eq=False)
 class CellsLeft:
-    """Derives the cells left from map, ledger, company and order."""
+    """Derives the cells left from map, ledger, company and order; owns those given up."""
 
     _config: MissionConfig
     _map: MapState
@@ -34,15 +37,20 @@ class CellsLeft:
     _company: Company
     _order: PresentOrder
     # The last area, and its edge cells.
-    _edge: tuple[ReachableArea | None, NDArray[np.bool_]] = field(
-        default=(None, np.empty((0, 0), bool)), init=False
-    )
+    _edge: tuple[ReachableArea | None, NDArray[np.bool_]] = field(default=NO_AREA, init=False)
+    # Cells tried in vain; cells of an area out of reach, although another map may show a way.
+    _tried: tuple[Window, NDArray[np.bool_]] = field(default=NO_CELLS, init=False)
+    _shut: tuple[ReachableArea | None, NDArray[np.bool_]] = field(default=NO_AREA, init=False)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
         open_cells = self.unswept(window)
         self._order.exploration.mark(open_cells, window)
         return open_cells
+
+    def untried(self, window: Window) -> NDArray[np.bool_]:
+        """Return which of the ``open_cells`` this robot has not given up."""
+        return self.open_cells(window) & ~self._given_up(window)
 
     def unswept(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` are asked for and not visited."""
@@ -52,10 +60,49 @@ class CellsLeft:
 
     def open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return the cells that this robot (in a fleet: in its part) still has to visit."""
-        window = area.lattice.window
-        cells = self._company.mine(self.unswept(window), area).copy()
-        self._order.exploration.mark(cells, window)
+        cells, part = self._divided(area)
+        if part is not None:
+            cells &= part
+        self._order.exploration.mark(cells, area.lattice.window)
         return cells
+
+    def _divided(self, area: ReachableArea) -> tuple[NDArray[np.bool_], NDArray[np.bool_] | None]:
+        """Return the unswept cells of an area, and this robot's part; see ``Company.part``.
+
+        If others have a part, the cells that this robot has given up are left to them.
+        """
+        unswept = self.unswept(area.lattice.window)
+        untried = unswept & ~self._given_up(area.lattice.window)
+        part = self._company.part(untried, area)
+        return unswept if part is None else untried, part
+
+    def _given_up(self, window: Window) -> NDArray[np.bool_]:
+        given_up, (area, shut) = carried(self._tried[1], self._tried[0], window), self._shut
+        if area is None or area is not self._map.area:
+            return given_up
+        return given_up | carried(shut, area.lattice.window, window)
+
+    def give_up(self, area: ReachableArea) -> bool:
+        """Leave this robot's cells to others until a retry; return whether others have any left."""
+        (mine, others), window = self._reachable_parts(area), area.lattice.window
+        self._tried = window, mine | carried(self._tried[1], self._tried[0], window)
+        return bool(others.any())
+
+    def pass_over(self, area: ReachableArea) -> bool:
+        """Leave this robot's cells to others until the next map; return whether there were any."""
+        mine, _ = self._reachable_parts(area)
+        self._shut = area, mine | (self._shut[1] if self._shut[0] is area else np.False_)
+        return bool(mine.any())
+
+    def _reachable_parts(self, area: ReachableArea) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the cells of this robot's part and of others' parts; none without parts."""
+        cells, part = self._divided(area)
+        cells &= area.reachable & (part is not None)
+        return (cells, cells) if part is None else (cells & part, cells & ~part)
+
+    def try_again(self) -> None:
+        """Forget which cells were given up."""
+        self._tried, self._shut = NO_CELLS, NO_AREA
 
     @property
     def is_exploring(self) -> bool:
@@ -132,9 +179,9 @@ class CellsLeft:
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return the cells of an area in which this robot has to sweep floor, covered or not."""
-        window = area.lattice.window
+        window, (_, part) = area.lattice.window, self._divided(area)
         asked = self.asked_for(window)
-        mine = self._company.mine(asked, area, self.unswept(window))
+        mine = asked if part is None else asked & part
         if self.keeps_passed:
             mine = mine | (self._ledger.passed.inside(window) & asked)
         return mine

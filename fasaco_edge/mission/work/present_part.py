@@ -86,7 +86,7 @@ class PresentPart:
     def try_all(self) -> None:
         """Forget which cells were tried in vain."""
         self._done, self._in_vain = -1, 0
-        self._company.try_again()
+        self.cells.try_again()
 
     @property
     def can_plan(self) -> bool:
@@ -121,7 +121,7 @@ class PresentPart:
         free = None if area is None else self._company.passable(area, cell)
         if reason := exploration.seek(zone, area, free, cell):
             return reason
-        of_others = self._company.viewpoints(self.cells.open_cells, cell)
+        of_others = self._company.viewpoints(self.cells.untried, cell)
         ends = self.cells.ends_of_map(cell) if self.reach.is_map_cut else ()
         viewpoints = chain(((at, OTHERS_SEE) for at in of_others), ((at, MAP_ENDS) for at in ends))
         looks = (exploration.look_beyond(at, cell, why) for at, why in viewpoints)
@@ -166,26 +166,12 @@ class PresentPart:
         if is_given_up and self.scope.give_up_first():
             return False
         area = self._map.area
-        if is_given_up and area is not None:
-            unswept = self.cells.unswept(area.lattice.window) & area.reachable
-            untried = self._company.give_up(unswept, area)
-            if untried is not None:
-                # Parts that other robots may leave unswept come before a retry.
-                is_given_up, self._in_vain = not untried.any(), 0
+        if is_given_up and area is not None and self.cells.give_up(area):
+            # Parts that other robots may leave unswept come before a retry.
+            is_given_up, self._in_vain = False, 0
         return is_given_up
 
     @property
     def done(self) -> int:
         """Number of cells that this robot has covered, or has visited as viewpoints."""
         return self._ledger.current.snapshot().cells + self._order.exploration.reached
-
-    def pass_over_unreachable(self) -> bool:
-        """In a fleet, pass over cells that are unreachable now; return whether there were any.
-
-        Reachable cells of others' parts come before a retry.
-        """
-        area = self._map.area
-        if area is None:
-            return False
-        unswept = self.cells.unswept(area.lattice.window) & area.reachable
-        return self._company.pass_over(unswept, area)

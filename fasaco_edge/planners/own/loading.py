@@ -1,7 +1,7 @@
 """Loading of a planner of the user's own by its place, and its exceptions as text.
 
 A place is ``FILE.py:NAME``, or ``MODULE:NAME`` of a module that this interpreter can import. The
-code runs with the rights of the process. Imports no numba.
+code runs with the rights of the process. This module imports no numba.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def load(place: str) -> UserCode:
 
 
 def user_code(planner: object, name: str = "", said: str = "planner", file: str = "") -> UserCode:
-    """Return a function, an object with ``plan(problem)``, or an object of such a class.
+    """Return a planner from a function, an object with ``plan(problem)``, or its class.
 
     Args:
         planner: the object to check.
@@ -180,7 +180,7 @@ def failure(error: BaseException, name: str, file: str) -> PlannerFailed:
     try:
         said = getattr(error, "msg", None) or str(error)
     except Exception:  # the user's exception class may itself fail
-        said = "says nothing"
+        said = "no message"
     return PlannerFailed(
         f"planner {name}: {kind}: {said}{lines}", hint=None if lines else CALLED_WITH
     )

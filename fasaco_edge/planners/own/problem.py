@@ -82,7 +82,7 @@ class OwnPlanner:
 
     Attributes:
         code: the code.
-        seed: passed to it.
+        seed: seed passed to the code.
         most_s: time that it may take [s]; None for no limit.
     """
 
@@ -118,7 +118,7 @@ def walk_of(code: UserCode, problem: GridProblem, most_s: float | None = None) -
         IllegalWalk: the result is not a walk, or does not solve the problem.
     """
     try:
-        # All that runs the user's code: ``_in_bounds`` runs it, too, if it returned a generator.
+        # The user's code runs here only: ``_in_bounds`` also runs it, if it returned a generator.
         with no_longer_than(most_s):
             given = code.walk(problem)
             if not isinstance(given, Iterable) or getattr(given, "shape", None) == ():

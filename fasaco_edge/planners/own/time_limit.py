@@ -15,15 +15,15 @@ AGAIN_S = 0.1
 
 
 class TookTooLongError(BaseException):
-    """The time is over; not an ``Exception``, as the user's code may catch all of these."""
+    """The time is over. This is not an ``Exception``, which the user's code may catch."""
 
 
 @contextmanager
 def no_longer_than(most_s: float | None) -> Iterator[None]:
     """Interrupt the block after this time [s]; None for no limit.
 
-    There is no limit outside the main thread, as only it gets signals, and none if the program has
-    a timer of its own. A call into a compiled library is interrupted when it returns.
+    There is no limit outside the main thread, which alone gets signals, nor if the program has a
+    timer of its own. A call into a compiled library is interrupted when it returns.
 
     Raises:
         TookTooLongError: the time was over.

@@ -103,7 +103,7 @@ def _sweep(
 
 
 def stc(*unused: object) -> FixedRule:
-    """Return spanning-tree coverage; colony and threads are unused, also below."""
+    """Return spanning-tree coverage; like the two below it uses neither colony nor threads."""
     return FixedRule("stc", _around_tree)
 
 
@@ -120,7 +120,7 @@ def zigzag(*unused: object) -> FixedRule:
 def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.int32]]:
     """Yield complete walks, flat cells int32 (n,).
 
-    On the first, an ant always takes the cell with the fewest open neighbours (Warnsdorff's rule).
+    For the first, an ant always enters the cell with the fewest open neighbours (Warnsdorff).
     If turns cost, four more follow, each the best on some grids: an ant that goes straight on, the
     spiral, the zigzag, the spanning tree. If a direction of lanes is preferred, the last walk is a
     zigzag in this direction.

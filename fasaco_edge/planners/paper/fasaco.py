@@ -104,7 +104,7 @@ class Colony:
         return walk, cost_us
 
     def offer(self, walk: NDArray[np.int32], cost_us: int) -> None:
-        """Take a walk, flat cells int32 (n,), as the best if it is the first, or cheaper."""
+        """Take a walk, flat cells int32 (n,), as the best if it is the first or the cheapest."""
         if not self.best.size or cost_us < self.best_us:
             self.best, self.best_us = walk, cost_us
 
@@ -153,7 +153,7 @@ class Group(NamedTuple):
     Attributes:
         cohort: index of their cohort.
         velocity: their velocity [cells/move].
-        streams: a random stream for each, int64 (ants, 4), independent of all others.
+        streams: a random stream for each ant, int64 (ants, 4), independent of all others.
         is_last: whether it is the last group of its cohort.
     """
 

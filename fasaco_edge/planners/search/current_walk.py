@@ -1,7 +1,7 @@
 """Current walk of a search, and its best walk so far.
 
 A search changes parts of the walk: a region of the ground that is loaded and put back
-(``walk_region``), or windows (``windows``). The results are accepted here. Walks are framed cells.
+(``walk_region``), or windows (``windows``). This module accepts results. Walks are framed cells.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class CurrentWalk:
 
     @property
     def least_us(self) -> int:
-        """Cost of the best walk, including those in windows [us]."""
+        """Cost of the best walk, in windows or not [us]."""
         if self.windows is None or not self._in_windows:
             return self.best_us
         return min(self.best_us, self.windows.best_us)

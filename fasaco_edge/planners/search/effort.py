@@ -9,7 +9,7 @@ import numpy as np
 from fasaco_edge.kernels.local_search.perturbation import PerturbationRules
 from fasaco_edge.planners.cost import CoverageCost
 
-# Temperatures of an annealing: from 1.5 down to 0.2.
+# Temperatures of an annealing, from 1.5 down to 0.2, in the unit of ``effort_for``.
 LEVELS = tuple(1.5 * (0.2 / 1.5) ** (level / 15) for level in range(16))
 
 WHOLE_WALK = -1
@@ -87,23 +87,25 @@ class RepairEffort:
     steady_us: int
 
 
-def repair_for(cost: CoverageCost) -> RepairEffort:
+def repair_for(cost: CoverageCost, *, has_ants: bool = True) -> RepairEffort:
     """Return the repair parameters for a cost: only changes with a gain are accepted.
 
     If turns are free, proposals are made all over the neighbourhood of a change.
     """
+    by_ants = BY_ANTS if has_ants else 0
     rules = PerturbationRules(
         limit=100,
         proposals=6,
         radius=WHOLE_WALK,
         temperature_us=0,
         acceptance_us=0,
-        loops_of_256=256 - BY_ANTS,
-        ants_of_256=BY_ANTS,
+        loops_of_256=256 - by_ants,
+        ants_of_256=by_ants,
         strict=True,
     )
     if not (cost.quarter_turn_us or cost.is_priced):
         return RepairEffort(rules, 30_000, 24_000, 0)
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
-    rules = rules._replace(proposals=40, radius=5, temperature_us=unit * 3 // 2, loops_of_256=64)
+    loops = (256 - by_ants) // 2
+    rules = rules._replace(proposals=40, radius=5, temperature_us=unit * 3 // 2, loops_of_256=loops)
     return RepairEffort(rules, 95_000, 70_000, 2 * cost.step_us)

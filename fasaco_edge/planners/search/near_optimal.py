@@ -46,7 +46,7 @@ class NearOptimal:
     """Local search in which ants make every other perturbation; one thread is used.
 
     Attributes:
-        has_ants: False for a search without ants, for comparison.
+        has_ants: False for searches and repairs without ants, for comparison.
     """
 
     config: ColonyConfig = field(default_factory=ColonyConfig)
@@ -77,7 +77,7 @@ class NearOptimal:
     ) -> CoveragePath:
         if not problem.can_repair:
             return self._search(problem, stop, observe)
-        path = repaired(problem, self.name, self.config, stop)
+        path = repaired(problem, self.name, self.config, stop, has_ants=self.has_ants)
         if problem.only_better or not is_poor(problem, path):
             return path
         proposals = SHORT_SEARCH + SHORT_SEARCH_PER_CELL * problem.cells

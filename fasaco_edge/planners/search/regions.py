@@ -107,7 +107,7 @@ class Neighbourhood:
 def neighbourhoods(
     framed: FramedGround, ahead: NDArray[np.int32], changed: NDArray[np.int32]
 ) -> Iterator[Neighbourhood]:
-    """Yield the neighbourhood of the robot, and then those of other changes.
+    """Yield the neighbourhood of the robot, and then the neighbourhoods of other changes.
 
     Args:
         framed: the ground.

@@ -34,7 +34,7 @@ from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_
 PERTURBATIONS_AT_ONCE = 8
 # Limit on the perturbations of a neighbourhood, in case no move can be proposed in it.
 MOST_PERTURBATIONS = 100
-# Proposals of a second repair, for the path ahead, as a share of those of the first.
+# Proposals of a second repair, for the path ahead, as a share of the first repair's.
 FEW = 0.2
 
 # Attempts to improve a valid walk: stride between the first spots of two attempts; approximate
@@ -47,7 +47,12 @@ BOUNDED_CELLS = 2_000
 
 
 def repaired(
-    problem: CoverageProblem, name: str, config: ColonyConfig, stop: StoppingCriterion
+    problem: CoverageProblem,
+    name: str,
+    config: ColonyConfig,
+    stop: StoppingCriterion,
+    *,
+    has_ants: bool = True,
 ) -> CoveragePath:
     """Return a complete walk that keeps the valid parts of ``problem.before``.
 
@@ -56,8 +61,10 @@ def repaired(
         name: name of the planner.
         config: seed, and constants of the ants.
         stop: stopping criterion.
+        has_ants: whether ants make every other perturbation.
     """
-    repair = _Repair(problem, config, repair_for(problem.cost))
+    effort = repair_for(problem.cost, has_ants=has_ants)
+    repair = _Repair(problem, config, effort)
     is_stopped = _run(repair, stop)
     path = repair.path(name, config.seed)
     if problem.whole is not None:
@@ -68,7 +75,7 @@ def repaired(
     is_large = problem.cells > BOUNDED_CELLS
     if is_stopped or is_large or common_beginning(next_cells, path.cells) >= held:
         return path
-    return _steady(problem, config, path, held - 1, repair.completed_us, stop)
+    return _steady(problem, config, effort, path, held - 1, repair.completed_us, stop)
 
 
 def _run(repair: _Repair, stop: StoppingCriterion) -> bool:
@@ -79,6 +86,7 @@ def _run(repair: _Repair, stop: StoppingCriterion) -> bool:
 def _steady(
     problem: CoverageProblem,
     config: ColonyConfig,
+    effort: RepairEffort,
     path: CoveragePath,
     held: int,
     completed_us: int,
@@ -95,7 +103,6 @@ def _steady(
         rest = replace(problem.after(held), whole=None)
     except NothingToCover:
         return path
-    effort = repair_for(problem.cost)
     few = replace(effort, proposals=int(FEW * effort.proposals), held=0)
     repair = _Repair(rest, config, few, path.work)
     _run(repair, stop)
@@ -188,7 +195,6 @@ class _Repair:
             yield
 
     def _is_proven(self) -> bool:
-        """Return whether the walk is proven optimal."""
         if self._bound is None:
             return False
         progress = self.progress()

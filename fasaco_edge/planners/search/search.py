@@ -61,7 +61,7 @@ LOCAL_SEARCH = 1 << 32
 
 
 class ColonySearch:
-    """A running search: a generator of pauses; it can be abandoned at each."""
+    """A running search: a generator that pauses; the search can be abandoned at each pause."""
 
     def __init__(
         self,
@@ -138,7 +138,6 @@ class ColonySearch:
         return self._walk.work + SearchWork(ants=self._first_walks)
 
     def _is_proven(self) -> bool:
-        """Return whether the walk is proven optimal."""
         if self._bound is None:
             return False
         if self._walk.least_us <= self._bound.cost_us:
@@ -148,7 +147,7 @@ class ColonySearch:
         return only_steps and self.progress().steps == self._bound.steps
 
     def _tighten(self, work: int) -> LowerBound:
-        """Return the lower bound after this much more work on it."""
+        """Improve the lower bound by this much work; return it."""
         self._bound = self._bound or LowerBound(self._problem)
         self._bound.tighten(work)
         return self._bound
@@ -224,7 +223,7 @@ class ColonySearch:
                     return
 
     def _solve_windows(self) -> Iterator[None]:
-        """Solve windows of the walk again, if turns cost; resume the last ones."""
+        """Solve windows of the walk again, if turns cost; resume the last windows."""
         windows = None if self._is_proven() else self._window_search()
         if windows is None or not self._walk.load_windows():
             return

@@ -1,7 +1,7 @@
 """Search trail: the pheromone that the ants of a search or a repair read and change.
 
-It begins as the mission's living trail, and is uniform where there is none. For a search in a
-region, its part of the trail is copied, and pasted back at the end.
+It begins as the mission's living trail, and is uniform where the mission has none. For a search in
+a region, the region's part of the trail is copied, and pasted back at the end.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class SearchTrail:
         self._tau[window.slices_in(whole)] = _inner(box, trail)
 
     def changed(self) -> TrailSnapshot | None:
-        """Return the part that ants have walked on, at the end; None if there is none."""
+        """Return the part that ants have walked on, at the end; None if no ant has walked."""
         return None if self._window is None else TrailSnapshot(self._window, self._tau)
 
     def snapshot(self, ants: int, steps: int) -> ColonySnapshot:
@@ -104,8 +104,8 @@ def _rules(problem: CoverageProblem, config: ColonyConfig) -> AntRules:
 def powers_of_turns(cost: CoverageCost, beta: float) -> NDArray[np.float64]:
     """Return eta ** beta of equation (5), Carr and Wang 2022, by the quarter-turns of a move.
 
-    The result is float64 (5,). Eta is the duration of a step divided by that of the move with its
-    turns.
+    The result is float64 (5,). Eta is the duration of a step divided by the duration of the move
+    with its turns.
     """
     move_s = cost.step_s + np.arange(MOST_QUARTERS + 1) * cost.quarter_turn_s
     eta = cost.step_s / move_s

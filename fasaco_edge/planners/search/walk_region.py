@@ -155,13 +155,13 @@ class WalkRegion:
 
     @property
     def work(self) -> SearchWork:
-        """Work in this region and those before it."""
+        """Work in this region and in the regions loaded before."""
         work, ants = self._memory.work, self._search.colony.counts[ANTS]
         return SearchWork(int(ants), int(work[PERTURBATIONS]), int(work[PROPOSALS]))
 
     @property
     def saved_by_ants_us(self) -> NDArray[np.int64]:
-        """What discs rebuilt by each cohort have saved here [us], int64 (cohorts,)."""
+        """Cost saved here by the discs that each cohort rebuilt [us], int64 (cohorts,)."""
         return self._search.colony.saved_us
 
     def improve(self, temperature_us: int, proposals: int, random: NDArray[np.uint64]) -> None:

@@ -219,8 +219,8 @@ def _copy(source: Passages, target: Passages) -> None:
 def thinned(walk: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return a walk over the same cells that takes no step three times, int32 (m,).
 
-    Of three passes over a step, two have the same direction. Both are left out, and the part of the
-    walk between them is reversed, so that it joins the walk before to the walk after them.
+    If a step is taken three times, two of them have the same direction. Both are left out, and the
+    part of the walk between them is reversed, so that the walk stays connected.
     """
     while walk.size > 1:
         low, high = np.minimum(walk[:-1], walk[1:]), np.maximum(walk[:-1], walk[1:])

@@ -83,7 +83,7 @@ def chunks_in(path: Path) -> Iterator[Chunk]:
     """Yield the chunks in the complete frames of a part.
 
     Raises:
-        UnreadableRecording: the file is missing, is no recording, or is damaged.
+        UnreadableRecording: the file is missing or damaged, or is not a recording.
     """
     with open_part(path) as (recording, scan):
         yield from chunks(recording, scan)
@@ -126,7 +126,7 @@ def chunk_at(descriptor: int, offset: int) -> Chunk:
     except (*BROKEN, pa.ArrowException) as error:
         raise ValueError(f"the frame at byte {offset}: {error or 'torn'}") from error
     if chunk is None:
-        raise ValueError(f"the frame at byte {offset} is another one by now")
+        raise ValueError(f"the frame at byte {offset} has changed")
     return chunk
 
 
@@ -175,10 +175,10 @@ def _unpacked(message: Fields) -> pa.Buffer:
     if packing == NOT_PACKED:
         return pa.py_buffer(packed)
     if packing != LZ4:
-        raise ValueError(f"packed in a way that is not known, {packing}")
+        raise ValueError(f"packed in an unknown way, {packing}")
     claimed, most = _number(message, UNPACKED, 0), min(len(packed) * LZ4_RATIO, MOST_CHUNK_BYTES)
     if claimed > most:
-        raise ValueError(f"claims {claimed} bytes; {len(packed)} packed ones hold at most {most}")
+        raise ValueError(f"claims {claimed} bytes; {len(packed)} packed bytes hold at most {most}")
     return pa.decompress(packed, decompressed_size=claimed, codec="lz4_raw")
 
 
@@ -200,7 +200,7 @@ def _check_not_compressed(flat: bytes) -> None:
     header = _slot(flat, message, _HEADER)
     rows = header + struct.unpack_from("<I", flat, header)[0]
     if _slot(flat, rows, _COMPRESSION):
-        raise ValueError("columns that are compressed, which none of a recorder's are")
+        raise ValueError("compressed columns, which no recorder writes")
 
 
 def _slot(flat: bytes, table: int, number: int) -> int:
@@ -263,7 +263,7 @@ def recording_id(path: Path) -> str:
     """Return the id of the run that a file belongs to; "" if the file has no complete frame.
 
     Raises:
-        UnreadableRecording: the file is missing, or is no recording.
+        UnreadableRecording: the file is missing, or is not a recording.
     """
     return next((chunk.recording_id for chunk in chunks_in(path)), "")
 
@@ -272,7 +272,7 @@ def is_fleet_recording(path: Path) -> bool:
     """Return whether a file is the recording of a fleet.
 
     Raises:
-        UnreadableRecording: the file is missing, or is no recording.
+        UnreadableRecording: the file is missing, or is not a recording.
     """
     roots = (chunk.entity.partition("/")[0] for chunk in chunks_in(path))
     known = (root for root in roots if root in (entities.FLEET, entities.WORLD, entities.INPUTS))

@@ -27,8 +27,8 @@ from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 Seconds = NDArray[np.float64]
-# Between two stamps of which the second is earlier, or later by more than this many times the
-# expected time plus a second, the simulation was restarted: there the recorder's clock counts.
+# The simulation was restarted between two stamps if the second is earlier, or later by more than
+# this many times the expected time plus a second: there the recorder's clock counts.
 MOST_TIMES = 10.0
 
 
@@ -124,6 +124,6 @@ def _settings(arrival: Arrival) -> KnownSettings | None:
 
 
 def _converted(at_s: Seconds, these: Seconds, those: Seconds) -> Seconds:
-    """Convert times of one clock to another one; both run at the same rate outside known times."""
+    """Convert times of one clock to the other; outside known times both run at the same rate."""
     before, after = np.minimum(at_s - these[0], 0.0), np.maximum(at_s - these[-1], 0.0)
     return np.asarray(np.interp(at_s, these, those) + before + after, np.float64)

@@ -1,6 +1,6 @@
 """Content of the parts of a run: samples byte for byte, plots, states, log, places of drawings.
 
-Of a file that is torn or still being written, the complete frames are read; no file is changed.
+From a file that is torn or still being written, the complete frames are read; no file is changed.
 Drawings are large: only their places in the files are kept, and each is read on request.
 """
 
@@ -54,7 +54,7 @@ class RecordedSamples:
         topics: topics to decode, in which case missing samples are not counted; None for all.
 
     Raises:
-        UnreadableRecording: a file is no recording, or none has samples.
+        UnreadableRecording: a file is not a recording, or none has samples.
     """
 
     def __init__(
@@ -184,7 +184,7 @@ class RunRecord:
             [s], and value.
         texts: times and texts of each entity of states, or log.
         drawn: places of the drawings of each entity of DRAWN, in order of time. Each part repeats
-            those in force at its beginning.
+            the drawings in force at its beginning.
         anchor: origin of drawings (x, y) [m], float64 (2,).
         batches: the samples, for ``RecordedSamples``.
     """
@@ -209,7 +209,7 @@ def read_run_record(paths: Sequence[Path], progress: Progress = lambda *_: None)
     """Read the parts of one run, in any order.
 
     Args:
-        paths: the files; a torn one is read up to its last complete frame, and not changed.
+        paths: the files; a torn file is read up to its last complete frame, and not changed.
         progress: called with each chunk, with amounts in bytes.
 
     Raises:

@@ -68,7 +68,7 @@ class Repair:
 
 
 def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan | None:
-    """Return the scan of the frames of ``recording``; None if the file is no recording.
+    """Return the scan of the frames of ``recording``; None if the file is not a recording.
 
     A file with less than a header, whose writer was killed, counts as a recording without frames.
     The first ``known_bytes`` are header and complete frames, which the scan skips and does not
@@ -105,7 +105,7 @@ def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
     """Open a part of a recording; add its name to errors raised within the context.
 
     Raises:
-        UnreadableRecording: the file is missing, is no recording, or is damaged.
+        UnreadableRecording: the file is missing or damaged, or is not a recording.
     """
     try:
         check_plain(path)
@@ -134,8 +134,8 @@ def _end_of_data(recording: BinaryIO, total: int) -> int:
 def repair_recording(path: Path) -> Repair | None:
     """Truncate ``path`` after its last complete frame; None if nothing was torn.
 
-    These are left unchanged: a file that a writer has locked, a recording with a footer or without
-    a header, and any other file.
+    Left unchanged are a file that a writer has locked, a recording with a footer or without a
+    header, and any file that is not a recording.
     """
     with open(path, "r+b", opener=_open_no_link) as recording:
         try:

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge import states
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.states import State
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 Colour = tuple[int, int, int]
@@ -93,7 +95,7 @@ def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
 
 
 def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
-    """Return points [m], float64 (n, 2), as a line; an empty one for fewer than two points.
+    """Return points [m], float64 (n, 2), as a line; an empty line for fewer than two points.
 
     ``style_archetype`` has its colour and width, which are logged once.
     """
@@ -197,30 +199,25 @@ def grid_archetype(
     )
 
 
-GREEN, AMBER, RED = 0x059669FF, 0xD97706FF, 0xDC2626FF
-BLUE, VIOLET, GREY = 0x2563EBFF, 0x7C3AEDFF, 0x6B7280FF
-
-STATES: dict[str, dict[str, int]] = {
+SHADES: dict[states.Colour, int] = {
+    "grey": 0x6B7280FF,
+    "violet": 0x7C3AEDFF,
+    "green": 0x059669FF,
+    "cyan": 0x2563EBFF,
+    "blue": 0x2563EBFF,
+    "amber": 0xD97706FF,
+    "red": 0xDC2626FF,
+}
+STATES = {
     entities.MISSION_STATE: {
-        "idle": GREY,
-        "waiting for map": GREY,
-        "waiting for pose": GREY,
-        "loading": VIOLET,
-        "planning": VIOLET,
-        "covering": GREEN,
-        "returning": GREEN,
-        "charging": BLUE,
-        "paused": AMBER,
-        "blocked": RED,
-        "degraded": AMBER,
-        "done": BLUE,
-        "silent": AMBER,
+        **{state.value: SHADES[state.row.colour] for state in State},
+        "silent": SHADES["amber"],
     },
     entities.RECORDER_STATE: {
-        "recording": GREEN,
-        "disk full": RED,
-        "stalled": AMBER,
-        "stopping": GREY,
+        "recording": SHADES["green"],
+        "disk full": SHADES["red"],
+        "stalled": SHADES["amber"],
+        "stopping": SHADES["grey"],
     },
 }
 
@@ -231,8 +228,6 @@ def log_styles(writer: RecordingWriter) -> None:
     for entity, style in LINES.items():
         writer.log_static(entity, style_archetype(style))
     for entity, colours in STATES.items():
-        states = list(colours)
+        names = list(colours)
         palette = np.array(list(colours.values()), np.uint32)
-        writer.log_static(
-            entity, rr.StateConfiguration(values=states, labels=states, colors=palette)
-        )
+        writer.log_static(entity, rr.StateConfiguration(values=names, labels=names, colors=palette))

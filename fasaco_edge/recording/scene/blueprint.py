@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
+from fasaco_edge.recording.scene.curves import COVERAGE, CURVES, DETAILS, Plot
 from fasaco_edge.recording.sdk import rr, rrb
 
 # Bounds of the view without a map [m].
@@ -17,8 +18,6 @@ MARGIN = 1.1
 # this layout at 1280 x 720.
 FIELD_OF_VIEW_RAD = math.radians(55.0)
 VIEW_ASPECT, PHEROMONE_ASPECT = 1.3, 2.2
-# Upper end of the gap's plot: larger gaps, of the last metres, say nothing about the mission.
-MOST_GAP = 2.0
 
 MAP_BACKGROUND = [38, 41, 48]
 PHEROMONE_BACKGROUND = [10, 10, 14]
@@ -31,8 +30,6 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
     bounds = bounds or NO_MAP
     states = rrb.StateTimelineView(origin="/state", name="States")
     card = rrb.TextDocumentView(origin=f"/{entities.RUN_CARD}", name="Run")
-    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-    coverage = plot_view("Cells covered [share]", "metrics/coverage", legend, 1.1)
     return rrb.Blueprint(
         rrb.Tabs(
             rrb.Horizontal(
@@ -40,12 +37,12 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
                 rrb.Vertical(
                     _pheromone_view(bounds),
                     log_view(),
-                    rrb.Horizontal(card, coverage, column_shares=[3, 2]),
+                    rrb.Horizontal(card, _curves_view(COVERAGE), column_shares=[3, 2]),
                     row_shares=[6, 3, 4],
                 ),
                 name="Mission",
             ),
-            rrb.Grid(*_details(), grid_columns=2, name="Details"),
+            rrb.Grid(*map(_curves_view, DETAILS), grid_columns=2, name="Details"),
         ),
         rrb.TimePanel(state="collapsed", timeline=entities.WALL_CLOCK),
         rrb.BlueprintPanel(state="collapsed"),
@@ -85,15 +82,9 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
     )
 
 
-def plot_view(
-    name: str,
-    origin: str,
-    legend: rrb.PlotLegend,
-    top: float = 0.0,
-    contents: Sequence[str] = ("$origin/**",),
-) -> rrb.TimeSeriesView:
-    """Return a view of curves over the whole time; a ``top`` above 0 limits values to 0..top."""
-    axis = rrb.ScalarAxis(range=(0.0, top)) if top else None
+def plot_view(plot: Plot, contents: Sequence[str]) -> rrb.TimeSeriesView:
+    """Return a view of curves over the whole time."""
+    axis = rrb.ScalarAxis(range=(0.0, plot.top)) if plot.top else None
     # The whole mission; Rerun's default is a minute.
     whole = rrb.TimeAxis(
         view_range=rr.TimeRange(
@@ -101,30 +92,18 @@ def plot_view(
         )
     )
     return rrb.TimeSeriesView(
-        origin=f"/{origin}",
+        origin="/",
         contents=list(contents),
-        name=name,
+        name=plot.title,
         axis_x=whole,
         axis_y=axis,
-        plot_legend=legend,
+        plot_legend=rrb.PlotLegend(plot.legend),
     )
 
 
-def _details() -> list[rrb.TimeSeriesView]:
-    left, right = (rrb.PlotLegend(c) for c in (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop))
-    gaps = tuple(f"/{gap}" for gap in (entities.GAP, entities.LINE_GAP))
-    used = tuple(f"/{share}" for share in (entities.PROCESSOR, entities.BATTERY))
-    return [
-        plot_view("Latency [ms]", entities.LATENCY, right),
-        plot_view(
-            "Time above the least possible, as a share of it", "metrics/plan", right, MOST_GAP, gaps
-        ),
-        plot_view("Driving time saved by search, summed over all plans [s]", entities.SAVED, left),
-        plot_view("Memory [MB]", entities.MEMORY, left),
-        plot_view(
-            "Processor [% of a core], battery [%]", "metrics/resources", right, contents=used
-        ),
-    ]
+def _curves_view(plot: Plot) -> rrb.TimeSeriesView:
+    """Return the view of a plot, with its curves."""
+    return plot_view(plot, [f"/{curve.entity}" for curve in CURVES if curve.plot is plot])
 
 
 def log_view() -> rrb.TextLogView:

@@ -23,7 +23,7 @@ from fasaco_edge.wire.reasons import plain
 
 # Bytes of a path's point in the file: each path is drawn twice, also as the previous path.
 POINT_BYTES = 2 * 12
-# Time after which a plan of the same kind as the one before is logged at level INFO again.
+# Time after which another plan of the same kind is logged at level INFO again.
 LOGGED_AGAIN_NS = 60_000_000_000
 
 
@@ -64,8 +64,8 @@ class PathDrawing:
     def _log(self, about: PathAttachment, line: str) -> None:
         """Log a path, at level DEBUG if it says nothing new; the layout does not show that level.
 
-        A plan of the same kind as the one before is new after a while; a path without a plan, such
-        as a polished line, never is.
+        A plan of the same kind as the last is new again after ``LOGGED_AGAIN_NS``; a path without a
+        plan, such as a polished line, is never new.
         """
         kind, now_ns = about.reason.partition(":")[0], self._writer.wall_ns
         shown, at_ns = self._logged
@@ -109,7 +109,7 @@ def _path_line(message: PathMessage, about: PathAttachment) -> str:
 
 
 SPACING_M = 0.02
-# Period of drawing the driven path: drawn with each flush, it would be 5 % of the recording.
+# Period of drawing the driven path: drawn at each flush, the path would be 5 % of the recording.
 PERIOD_NS = 2_000_000_000
 
 
@@ -177,7 +177,6 @@ class AreaDrawing:
                 self._draw(entity, areas, style)
 
     def add_rooms(self, rooms: Sequence[Named]) -> None:
-        """Draw rooms."""
         if self._is_new(entities.ROOMS, rooms):
             size = 2 * POINT_BYTES * sum(len(outline or ()) for _, outline in rooms)
             self._layers.draw(

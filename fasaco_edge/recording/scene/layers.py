@@ -4,7 +4,7 @@ A viewer draws in float32, whose resolution at a UTM northing is 0.5 m. If the f
 from 0, everything is drawn relative to an anchor near it, in whole kilometres.
 
 A token bucket limits the rate of each layer, in bytes per second. While tokens are left, a drawing
-is made at once; otherwise it waits for tokens, and the next drawing replaces it.
+is made at once; otherwise it waits for tokens, and a newer drawing replaces it.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Anchor:
 
 
 def is_far_from(framed: Bounds, bounds: Bounds, share: float) -> bool:
-    """Return whether ``bounds`` differ from ``framed`` by more than a share of its size."""
+    """Return whether ``bounds`` differ from ``framed`` by more than a share of the frame's size."""
     size = max(framed[2] - framed[0], framed[3] - framed[1])
     moved = max(abs(a - b) for a, b in zip(framed, bounds, strict=True))
     return moved > share * size

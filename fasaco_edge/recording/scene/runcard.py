@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.states import AT_WORK, TROUBLED
 from fasaco_edge.text import duration, one_line
 from fasaco_edge.wire.documents.json_text import Settings
 from fasaco_edge.wire.documents.settings import known_settings
@@ -34,8 +35,8 @@ class RunDescription:
     Attributes:
         robot: name of the robot.
         began: beginning of the recording, UTC, as text.
-        version: version of the planner; "" while unknown.
-        config: configuration in the planner's status.
+        version: version of the daemon; "" while unknown.
+        config: configuration in the daemon's status.
         anchor: point (x, y) [m] of the map frame that is drawn at 0; None for the origin.
         outcome: outcome of the mission so far.
     """
@@ -49,7 +50,6 @@ class RunDescription:
 
     @property
     def name(self) -> str:
-        """The name of the run."""
         return f"{self.robot} {self.began}"
 
     def markdown(self) -> str:
@@ -95,7 +95,7 @@ def cells_of(status: Status) -> tuple[int, int] | None:
 
 
 # States without an outcome.
-UNDER_WAY = ("planning", "covering")
+UNDER_WAY = AT_WORK - TROUBLED
 
 
 class Outcome:

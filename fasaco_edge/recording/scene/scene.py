@@ -17,10 +17,10 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
+from fasaco_edge.recording.scene.curves import OF_PATH, OF_PHEROMONE, OF_RECORDER, OF_STATUS, Curves
 from fasaco_edge.recording.scene.drawings import AreaDrawing, DrivenPathDrawing, PathDrawing
 from fasaco_edge.recording.scene.layers import Anchor, Layers, is_far_from, size_in_file
 from fasaco_edge.recording.scene.runcard import Outcome, RunDescription
-from fasaco_edge.recording.scene.status_curves import COUNT_SPACING_NS, NOISE, Curves
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment
@@ -65,7 +65,6 @@ class Scene:
         self._draw_robot(DEFAULT_RADIUS_M)
 
     def add_map(self, grid: OccupancyGrid) -> None:
-        """Draw the map."""
         self._draw_grid(self._anchored(grid.geometry.origin).grid(grid))
 
     def _draw_grid(self, grid: OccupancyGrid) -> None:
@@ -119,14 +118,14 @@ class Scene:
         if anchor is None and len(message.xy):
             anchor = self._anchored(Pose2D(*message.xy[0].tolist()))
         self._paths.add(message, about, anchor or Anchor())
-        self._curves.add_path(about)
+        self._curves.add(OF_PATH, about)
 
     def add_floor(self, grid: OccupancyGrid) -> None:
         """Tint the swept floor."""
         if self._comes_again(entities.FLOOR, grid.geometry, grid.cells):
             return
         grid = self._anchored(grid.geometry.origin).grid(grid)
-        # With four bytes a pixel, it is twice as large after compression.
+        # With four bytes a pixel, the layer is twice as large after compression.
         size, drawn = 2 * size_in_file(grid.cells), 4 * grid.cells.size
         self._draw(entities.FLOOR, size, lambda: draw.floor_archetype(grid), drawn)
 
@@ -138,13 +137,11 @@ class Scene:
         message = self._anchored(message.geometry.origin).grid(message)
         in_file, size = size_in_file(message.levels), message.levels.size
         self._draw(entities.PHEROMONE, in_file, lambda: draw.pheromone_archetype(message), size)
-        # These limits are needed to convert levels to pheromone.
-        self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
-        self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
+        self._curves.add(OF_PHEROMONE, message)
 
     def add_status(self, status: Status) -> None:
-        """Plot the planner's figures, show its states, log its errors."""
-        self._curves.add_status(status)
+        """Plot the daemon's figures, show its states, log its errors."""
+        self._curves.add(OF_STATUS, status)
         self._outcome.add_status(status)
         self._add_configuration(status)
         if (restored := status.ledger.restored_cells) != self._restored:
@@ -156,7 +153,7 @@ class Scene:
             self.add_line(entities.MISSION_LOG, text, "WARN" if tone == BAD else "INFO")
         self._status = status
         errors = status.errors
-        # The count falls when the planner restarts.
+        # The count falls when the daemon restarts.
         if errors.total > self._errors:
             last = errors.last or "no text"
             self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
@@ -165,9 +162,7 @@ class Scene:
     def add_report(self, report: Recorder) -> None:
         """Show the recorder's own state and memory."""
         self.enter(entities.RECORDER_STATE, report.state, report.reason)
-        self._curves.draw(f"{entities.MEMORY}/recorder", report.rss_mb, NOISE)
-        if report.cpu_s:
-            self._curves.draw(entities.RECORDER_CPU_S, report.cpu_s, spacing_ns=COUNT_SPACING_NS)
+        self._curves.add(OF_RECORDER, report)
 
     def enter(self, entity: str, state: str, reason: str = "") -> None:
         """Show that ``entity`` is in ``state`` from now on; log it if there is a reason."""
@@ -181,7 +176,6 @@ class Scene:
             self.add_line(log, f"{state}: {reason}")
 
     def add_line(self, log: str, message: str, level: str = "INFO") -> None:
-        """Add a line to a log."""
         self._writer.log(log, rr.TextLog(message, level=level))
 
     def catch_up(self) -> None:

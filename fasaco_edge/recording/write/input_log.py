@@ -2,7 +2,7 @@
 
 Samples are gathered for almost a second, and then written as one blob, without Rerun's batching:
 ``kill -9`` loses at most that second. Each part begins with all samples in force, so that it can be
-read without the parts before it.
+read without earlier parts.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ IN_FORCE_BYTES = 8_000_000
 
 
 class InputLog:
-    """Writes samples into a writer; for the writer's thread only.
+    """Writes samples into a writer; only the writer's thread calls it.
 
     Inputs are written in full, paths as a digest. A status or a message about rooms is written when
     its content changes, else once in ``STATUS_PERIOD_NS`` to show progress, and at the end.
@@ -49,7 +49,7 @@ class InputLog:
         self._part = 0
         self._lost = 0
         self._next_ns = 0
-        # Of status and rooms: content and time of the last written sample, and the newest sample
+        # For status and rooms: content and time of the last written sample, and the newest sample
         # since.
         self._kept: dict[str, tuple[object, int]] = {}
         self._late: dict[str, Arrival] = {}
@@ -98,7 +98,7 @@ class InputLog:
             self._part = 0
 
     def _is_due(self, arrival: Arrival) -> bool:
-        """Return whether a status or rooms have new content, or the last written one is old."""
+        """Return whether status or rooms have new content, or their last written sample is old."""
         topic = arrival.topic
         if topic not in ("status", "rooms"):
             return False
@@ -133,7 +133,7 @@ def _rooms_news(arrival: Arrival) -> object:
 
 
 def _path_digest(arrival: Arrival) -> Arrival:
-    """Return the digest of a path, whose points are large and no input of the mission."""
+    """Return the digest of a path, whose many points are not an input of the mission."""
     payload = arrival.sample.payload
     with contextlib.suppress(MalformedMessage):
         payload = decode_path(payload).xy.tobytes()
@@ -145,7 +145,7 @@ def _path_digest(arrival: Arrival) -> Arrival:
 class _InForce:
     """The samples in force: the map, its updates, the newest sample of each other latched topic.
 
-    Several nodes publish static transforms: each different one is in force.
+    Several nodes publish static transforms: each different message is in force.
     """
 
     def __init__(self) -> None:

@@ -50,7 +50,7 @@ class RecordingPart:
     Rerun's logging calls never fail: only ``flush`` shows whether the data were written.
 
     Attributes:
-        refused: why the first message was not written ("" if it was): only ``abandon`` may follow.
+        refused: why the first message was not written: only ``abandon`` may follow; "" if it was.
 
     Raises:
         OSError: the file cannot be created.
@@ -81,7 +81,7 @@ class RecordingPart:
 
         def attach() -> None:
             try:
-                # No blueprint here: the call would wait for it, too.
+                # No blueprint: ``set_sinks`` would wait for that, too.
                 # The path names the descriptor, as another file may have the name by now.
                 self.stream.set_sinks(rr.FileSink(f"/proc/self/fd/{self._lock}"))
             except RuntimeError as error:
@@ -94,7 +94,7 @@ class RecordingPart:
             thread.join(0.02)
             if not thread.is_alive():
                 break
-            # A header without a writer: the writer has died.
+            # If the file has a header and no writer, the writer has died.
             if self.size and not self._has_writer():
                 self.refused = "its first message cannot be written"
             elif time.monotonic() > deadline:

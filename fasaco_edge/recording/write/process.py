@@ -79,8 +79,8 @@ def afforded_bytes(limit: int | None) -> int:
 # Number of waiting samples at which the writer is behind: about ten seconds of poses.
 BEHIND_SAMPLES = 1024
 
-# For each topic: when the writer is behind, a new sample replaces waiting ones of these topics. A
-# map replaces map updates, too.
+# For each topic: while the writer is behind, a new sample replaces waiting samples of these topics.
+# A map replaces map updates, too.
 SUPERSEDED = {
     topic.name: frozenset({topic.name}) for topic in TOPICS if topic.queues.recorder == NEWEST
 }
@@ -90,8 +90,8 @@ SUPERSEDED["map"] |= {"map_update"}
 class SampleQueue:
     """A queue of samples in order of arrival, of at most ``capacity_bytes``.
 
-    While the writer is behind, a sample replaces older ones (``SUPERSEDED``). While the queue is
-    full, new samples are dropped. Both kinds are counted as lost.
+    While the writer is behind, a sample replaces older samples (``SUPERSEDED``). While the queue is
+    full, new samples are dropped. Replaced and dropped samples count as lost.
     """
 
     def __init__(self, capacity_bytes: int, stamp: Callable[[str, Sample], Arrival]) -> None:

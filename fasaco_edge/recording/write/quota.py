@@ -1,7 +1,7 @@
 """Disk space for recordings: names and age of runs, deletion of old parts, free space.
 
 A run's name begins with a number above the highest existing one, as clocks may go backward (at each
-boot without a clock battery). Only parts of this robot's recordings are deleted, and none that is
+boot without a clock battery). Only parts of this robot's recordings are deleted, but none that is
 still being written.
 """
 
@@ -21,7 +21,7 @@ from fasaco_edge.errors import BadConfiguration
 
 MEGABYTE = 1_000_000
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
-# Upper limit of a run's number; a file with a larger one is not from a recorder.
+# Upper limit of a run's number; a file with a larger number is not from a recorder.
 MOST_RUNS = 900_000_000
 TIME = "%Y%m%dT%H%M%SZ"
 # Free space above the minimum that is required to resume recording [bytes].

@@ -1,6 +1,6 @@
 """The recorder of a robot, a process that records the samples on the bus.
 
-It cannot delay the planner. Zenoh's threads only add samples to a queue; one thread decodes, draws
+It cannot delay the daemon. Zenoh's threads only add samples to a queue; one thread decodes, draws
 and writes them.
 """
 

@@ -24,7 +24,7 @@ LOG = logging.getLogger(__name__)
 FLUSH_PERIOD_NS = 900_000_000
 # Retry period while nothing can be written.
 RETRY_PERIOD_NS = 1_000_000_000
-# Each abandoned part leaks threads and memory: the period doubles with each, up to this often.
+# Each abandoned part leaks threads and memory: the retry period doubles, at most this many times.
 MOST_DOUBLINGS = 5
 # Limit on the data between two flushes: Rerun's own queue has none.
 FLUSH_BYTES = 8_000_000
@@ -46,7 +46,7 @@ class WriterState(enum.Enum):
 
 
 class RecordingWriter:
-    """Writes to the parts ``<recording_id>-part<n>.rrd`` in a folder; for one thread only.
+    """Writes to the parts ``<recording_id>-part<n>.rrd`` in a folder; only one thread may call it.
 
     Rerun keeps times per thread, and logs data of a thread without a time as static.
 
@@ -141,7 +141,7 @@ class RecordingWriter:
 
         Args:
             entity, archetype: what to log, and where.
-            latched: whether it stays in force until the next one, so that parts begin with it.
+            latched: whether it stays in force until replaced, so that parts begin with it.
             size: its uncompressed size; 0 if small [bytes].
         """
         if latched:
@@ -161,7 +161,7 @@ class RecordingWriter:
         return True
 
     def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
-        """Log static data of an entity, in place of earlier ones."""
+        """Log static data of an entity, in place of earlier data."""
         self._static[entity] = archetypes
         if (stream := self._stream) is not None:
             stream.log(entity, *archetypes, static=True)
@@ -173,7 +173,7 @@ class RecordingWriter:
             stream.send_recording_name(name)
 
     def show(self, blueprint: rrb.Blueprint) -> None:
-        """Make ``blueprint`` the active one: a viewer takes the last one of a file."""
+        """Make ``blueprint`` the active blueprint: a viewer takes the last blueprint of a file."""
         self._blueprint = blueprint
         if (stream := self._stream) is not None:
             send_blueprint(stream, blueprint)

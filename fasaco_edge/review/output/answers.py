@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.comparison import floor_words
 from fasaco_edge.review.document import ReviewDocument
+from fasaco_edge.review.figures import floor_words
 from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen, direction
 from fasaco_edge.review.orders import ordered_words
 from fasaco_edge.review.spot import SWEPT_BY_OTHERS, Spot

@@ -10,8 +10,8 @@ from msgspec.structs import astuple
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.comparison import NOT_KNOWN, amount, count, figures, floor_words
 from fasaco_edge.review.document import ReviewDocument
+from fasaco_edge.review.figures import NOT_KNOWN, amount, count, figures, floor_words
 from fasaco_edge.review.floor_and_rooms import MILESTONES, room_at
 from fasaco_edge.review.orders import order_words, ordered_words
 from fasaco_edge.review.spot import spots_left

@@ -1,6 +1,5 @@
 // The panel: state, progress, commands and events as text, never as HTML.
 const find = (id) => document.getElementById(id);
-const LOOKS = { covering: "go", returning: "go", planning: "go", charging: "go", done: "go", blocked: "bad", degraded: "bad", paused: "wait" };
 
 function item(...parts) {
   const line = document.createElement("li");
@@ -62,7 +61,7 @@ function showState() {
     return;
   }
   find("state").textContent = state.word;
-  find("state").className = `chip ${state.in_trouble ? "bad" : LOOKS[state.state] || ""}`;
+  find("state").className = `chip ${state.look}`;
   find("does").textContent = state.does;
   showList("needs", state.needs.map((text) => item(text)));
   showProgress(state);

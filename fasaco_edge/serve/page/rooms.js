@@ -4,7 +4,7 @@ const foundRooms = () => (model.rooms && model.rooms.rooms) || [];
 const roomOf = (id) => foundRooms().find((room) => room.id === id);
 const titleOf = (key) => (typeof key === "number" ? (roomOf(key) || { title: `room ${key}` }).title : key);
 const shareOf = (room) => (model.shares ? model.shares.swept[room.id] : null);
-// A room is ordered by number, as a standing zone may have its name.
+// A room is ordered by number, as a configured zone may have its name.
 const zoneOf = (key) => (typeof key === "number" ? { name: titleOf(key), room: key } : { name: key });
 
 const hasShare = (room) => Number.isFinite(shareOf(room));

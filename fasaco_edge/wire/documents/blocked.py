@@ -1,6 +1,6 @@
 """Report of a follower to the daemon: what keeps the robot from driving its path, and where.
 
-The follower, a small program without msgspec, writes the same members by itself.
+The follower, a small program without msgspec, has its own writer of the same members.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Blocked(msgspec.Struct, frozen=True, kw_only=True):
     """What keeps the robot from driving its path.
 
     Attributes:
-        daemon: Zenoh id of the daemon whose path it is.
+        daemon: Zenoh id of the daemon that published the path.
         revision: revision of the path; 0 if unknown.
         reason: obstacle: something is ahead that the map does not show; stuck: the robot does not
             move as commanded, or its controller has given up; elsewhere: it cannot join the path.
@@ -38,7 +38,7 @@ class Blocked(msgspec.Struct, frozen=True, kw_only=True):
         held_s: how long the robot has been kept from driving [s].
         frame: frame of the places.
         x, y: where the robot is [m].
-        points: what is ahead: places x, y [m], the nearest first; none for elsewhere.
+        points: places x, y of what is ahead [m], the nearest first; none for elsewhere.
     """
 
     daemon: ZenohId
@@ -58,7 +58,7 @@ def decode_blocked(payload: bytes) -> Blocked:
     """Return the report in ``payload``.
 
     Raises:
-        MalformedMessage: it is no such report, or its reason is unknown.
+        MalformedMessage: the payload is not a report, or its reason is unknown.
     """
     report = decode_document(payload, Blocked)
     if report.reason not in REASONS:

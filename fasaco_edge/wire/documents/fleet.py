@@ -42,8 +42,8 @@ class CellTile(msgspec.Struct, frozen=True, array_like=True):
     """Some cells of a tile of 64 x 64: swept ones, or reachable ones.
 
     Attributes:
-        row, col: of the tile; its first cell is at 64 times these.
-        cells: 512 bytes in base64: a bit a cell, row by row, the first of eight the highest.
+        row, col: place of the tile; its first cell is at 64 times these numbers.
+        cells: 512 bytes in base64: a bit for each cell, row by row, most significant bit first.
     """
 
     row: TileIndex
@@ -80,11 +80,11 @@ class FleetMember(Document, frozen=True):
         x, y: position of the robot [m] in the frame of the map.
         step_s: time it takes to sweep a cell [s].
         epoch: changes whenever the robot drops some of its swept cells.
-        division: number of the newest division of the remaining cells known to it.
+        division: number of the newest division of the remaining cells that it knows.
         open_cells: number of cells known to it that are still to sweep.
         swept: its swept tiles: changed ones first, then all in turn.
-        kept: the cells of swept from before this epoch, without empty tiles; null if the robot
-            does not know.
+        kept: tiles of the cells that it swept before this epoch, without empty tiles; null if
+            unknown.
         lattice_deg: the angle of its cells' rows to the x axis of the map frame [deg].
         ground: tiles of cells that it can reach: changed ones first, then all in turn.
         by: name of the robot that made the newest division.

@@ -66,10 +66,10 @@ def encode_json(message: object) -> bytes:
 
     Raises:
         MalformedMessage: a number in it is not finite, or it is beyond the limits of readers.
-        TypeError: a value in it has no JSON.
+        TypeError: a value in it has no form in JSON.
     """
     plain = msgspec.to_builtins(message, str_keys=True)
-    # msgspec would write null for what is not finite.
+    # msgspec would write null for a number that is not finite.
     _check_limits(plain, "message")
     return msgspec.json.encode(plain)
 
@@ -78,8 +78,9 @@ def decode_json(payload: bytes) -> dict[str, object]:
     """Return the JSON object in ``payload``.
 
     Raises:
-        MalformedMessage: it is no JSON, no object, or beyond a limit: ``MAX_JSON_BYTES``,
-            ``MAX_JSON_DEPTH``, of integers ``MAX_JSON_INTEGER``, of others ``MAX_JSON_NUMBER``.
+        MalformedMessage: it is not JSON, not an object, or beyond a limit: ``MAX_JSON_BYTES``,
+            ``MAX_JSON_DEPTH``, for integers ``MAX_JSON_INTEGER``, for other numbers
+            ``MAX_JSON_NUMBER``.
     """
     if len(payload) > MAX_JSON_BYTES:
         text = f"JSON must have at most {MAX_JSON_BYTES} bytes, got {len(payload)}"
@@ -98,7 +99,7 @@ def decode_document(payload: bytes, kind: type[Struct]) -> Struct:
     """Return the JSON object in ``payload`` as a struct of type ``kind``.
 
     Raises:
-        MalformedMessage: it is no JSON object, or a member is missing or of another type.
+        MalformedMessage: it is not a JSON object, or a member is missing or of another type.
     """
     try:
         return msgspec.convert(decode_json(payload), kind)
@@ -107,10 +108,10 @@ def decode_document(payload: bytes, kind: type[Struct]) -> Struct:
 
 
 def decode_tolerant(payload: bytes, kind: type[Struct]) -> Struct:
-    """Return the members of a JSON object that fit ``kind``; no bytes are an empty object.
+    """Return the members of a JSON object that fit ``kind``; b"" counts as an empty object.
 
     Raises:
-        MalformedMessage: it is no JSON object.
+        MalformedMessage: it is not a JSON object.
     """
     return tolerant(decode_json(payload) if payload else {}, kind)
 
@@ -151,7 +152,7 @@ def _is_in_range(value: object) -> bool:
 
 
 def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - any type annotation
-    """Return a JSON value as one of ``kind``; UNSET where it does not fit."""
+    """Return a JSON value as a ``kind``; UNSET if it does not fit."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         # Only a number has a range.
@@ -162,7 +163,7 @@ def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - any type ann
         return next((found for found in fitting if found is not UNSET), UNSET)
     if origin is tuple and isinstance(value, list):
         if Ellipsis not in arguments:
-            # A tuple of fixed length fits as a whole: half a corner is of no use.
+            # A tuple of fixed length fits as a whole or not at all, as a corner does.
             return _fitting_plain(value, kind)
         items = (_fitting(item, arguments[0]) for item in value)
         return tuple(item for item in items if item is not UNSET)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class PlanFigures(Document, frozen=True):
-    """The plan that a path follows, at the time of planning; all null without one.
+    """The plan that a path follows, at the time of planning; all null without a plan.
 
     Attributes:
         planner: name of the planner.
@@ -77,7 +77,7 @@ class PlanFigures(Document, frozen=True):
             lower_bound_cost_s=round(plan.lower_bound_cost_s, 3) or None,
             gap=None if plan.gap is None else round(plan.gap, 6),
             saved_by_ants_s=round(plan.saved.ants, 3),
-            # A repair that keeps the path ahead may cost more than the walk before: it saved none.
+            # A repair that keeps the path ahead may cost more than the previous walk: it saves 0.
             saved_by_local_search_s=round(max(plan.saved.local_search, 0.0), 3),
             saved_by_velocity_s={
                 str(velocity): round(saved_s, 3) for velocity, saved_s in plan.saved.by_velocity
@@ -92,11 +92,11 @@ class PathReport(PlanFigures, frozen=True):
     Attributes:
         revision: counts the published paths.
         steps: number of steps when the path was published.
-        remaining_steps: still to drive.
+        remaining_steps: steps still to drive.
         line_s: seconds that the path ahead takes.
         line_gap: line_s / bound - 1, bound being the least time of any line that sweeps as much
             floor; null if the line sweeps none.
-        reason: why it replaced the previous one.
+        reason: why it replaced the previous path.
     """
 
     revision: Ordinal = 1
@@ -127,9 +127,9 @@ class PathAttachment(PlanFigures, frozen=True):
         daemon: Zenoh id of the daemon that published it, ``claim.id`` of its status.
         revision: counts the published paths of a mission, from 1; 0 for the empty path with which
             a daemon begins to plan.
-        map_stamp_ns: stamp of the map it was planned on [ns]; 0 without one.
-        map_revision: revision of that map, as in the status; 0 without one.
-        reason: why it replaces the previous one.
+        map_stamp_ns: stamp of the map it was planned on [ns]; 0 without a map.
+        map_revision: revision of that map, as in the status; 0 without a map.
+        reason: why it replaces the previous path.
         steps: steps from pose to pose.
         plan_ms: duration of planning; 0 if no plan was needed.
         changed: rectangle of the map in which cells appeared, vanished or have other neighbours;
@@ -156,7 +156,7 @@ class TrailAttachment(Document, frozen=True):
 
     Attributes:
         revision: revision of the path in force.
-        cells: number of cells that the trail spans: those with a step to another one.
+        cells: number of cells that the trail spans: cells with a step to another cell.
         branching: mean number of directions of a cell that are close to its strongest: 1 if each
             cell has a single one.
     """

@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.states import State
 from fasaco_edge.wire.documents.json_text import (
     Amount,
     Corners,
@@ -19,11 +20,8 @@ from fasaco_edge.wire.documents.json_text import (
     encode_json,
 )
 
-STATES: Final = (
-    *("idle", "waiting for map", "waiting for pose", "loading", "planning", "covering"),
-    *("returning", "charging", "paused", "blocked", "degraded", "done"),
-)
-State = Annotated[str, allowed(enum=STATES)]
+STATES: Final = tuple(state.value for state in State)
+StateName = Annotated[str, allowed(enum=STATES)]
 TROUBLES: Final = (
     *("not_begun", "no_pose", "pose_jumped", "no_map", "no_battery", "no_dock", "no_current"),
     *("shut_in", "blocked", "stands", "beside_line", "two_publishers", "no_effect"),
@@ -46,9 +44,9 @@ class CoverageReport(Document, frozen=True):
 
     Attributes:
         coverable: cells that are reachable, or have been since the order began.
-        covered: covered cells of these.
-        recovered: cells of these that are covered more than once.
-        remaining: cells of these that are still to cover.
+        covered: coverable cells that are covered.
+        recovered: coverable cells that are covered more than once.
+        remaining: coverable cells that are still to cover.
         unreachable: cells where the robot would fit, but that it cannot reach.
         free_out_of_reach_m2: area that the map shows free, but in no reachable cell.
         fraction: covered share of coverable.
@@ -77,9 +75,9 @@ class FloorReport(Document, frozen=True):
 
     Attributes:
         swept_m2: floor that the tool has passed over, reachable now or not.
-        reachable_m2: known floor that the tool can reach and has to sweep, or could reach since the
-            order began while the robot is shut in; null if the robot drives through the centres of
-            cells.
+        reachable_m2: known floor that the tool can reach and has to sweep; while the robot is shut
+            in, the floor that it could reach since the order began. Null if the robot drives
+            through the centres of cells.
         left: unswept part of reachable_m2 by reason, the largest first; null if unknown.
         out_of_reach: free floor on the map that the tool cannot reach, whether part of the order or
             not, by reason, the largest first; null if unknown.
@@ -105,7 +103,7 @@ class ZoneReport(Document, frozen=True):
     """The progress of a zone.
 
     Attributes:
-        pass: its newest pass; 0: not begun.
+        pass: number of its newest pass; 0 before the first.
         cells: number of reachable cells.
         covered: cells covered in that pass.
         polygon: corners x, y [m] in the frame of the map.
@@ -169,14 +167,14 @@ class MissionReport(Document, frozen=True):
         keep_out: number of keep-out zones, with those of the configuration; a mask counts as one.
         keep_outs: the keep-out zones in force, without those of the configuration.
         home: position the robot returns to; by default where the first order after a reset began.
-        tries: retries of cells left over.
+        tries: retries of the cells left over.
         unreached: part of the order that cannot be covered at present.
         waits_for_room: name of the room that the order waits for; null for none.
         left_out: rooms that the order for everything leaves out, by their settings.
         time_left_s: time until the order ends with the robot at home [s]; null without a limit.
         first_from: floor of this priority or more is planned now, as time or battery do not suffice
             for all; null if all floor is planned.
-        last_order: the order that was cancelled, as given, while no other has begun; null for none.
+        last_order: the cancelled order, as given, until another begins; null for none.
     """
 
     ordered: Annotated[str | None, allowed(enum=("command", "itself", None))] = None
@@ -224,7 +222,7 @@ class Reply(Document, frozen=True):
     """The reply to an accepted command."""
 
     robot: Name = ""
-    state: State = ""
+    state: StateName = ""
     reason: str = ""
     coverage: CoverageReport | None = None
     floor: FloorReport | None = None
@@ -264,7 +262,7 @@ class Error(Document, frozen=True, forbid_unknown_fields=True):
     """An error; sent as Zenoh's error reply.
 
     Attributes:
-        code: one of those in errors.yaml.
+        code: a code in errors.yaml.
         message: the fault and its place.
         hint: what to do about it; may be empty.
     """

@@ -24,9 +24,9 @@ class RoomReport(Document, frozen=True):
         outline: corners x, y [m] in the frame of the map, without holes.
         neighbours: numbers of the rooms that it has a passage to.
         encloses: numbers of the rooms that lie within its outline without being part of it.
-        swept: swept share of the room's reachable floor, in the present pass of an order that asks
-            for it, else of what was swept before. In a fleet, and where only cells are counted,
-            share of the reachable cells. Null if none is reachable.
+        swept: swept share of the room's reachable floor: in the present pass if the order includes
+            the room, else before. In a fleet, or if only cells are counted, covered share of the
+            reachable cells. Null if no floor is reachable.
         to_go_s: driving time of the path ahead within the room [s]; null without a path.
         passes: its passes in an order that names the room without passes, as in `mission.json`;
             null for as many as other zones get.
@@ -58,7 +58,7 @@ class Rooms(Document, frozen=True):
 
     Attributes:
         frame: frame of the map; "" before the first map.
-        revision: counter of changes of the rooms; swept shares change without it.
+        revision: counter of changes of the rooms, except of their swept shares.
     """
 
     frame: str = ""
@@ -67,7 +67,7 @@ class Rooms(Document, frozen=True):
 
     @property
     def outlined(self) -> tuple[RoomReport, ...]:
-        """The rooms that can be drawn: an outline has three corners, and lies on the map."""
+        """The rooms that can be drawn: the outline has three corners or more, on the map."""
         return tuple(
             room
             for room in self.rooms

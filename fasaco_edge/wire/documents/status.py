@@ -28,7 +28,7 @@ from fasaco_edge.wire.documents.replies import (
     FloorReport,
     MissionReport,
     Point,
-    State,
+    StateName,
     TroubleReport,
 )
 
@@ -42,8 +42,9 @@ class ClaimReport(Document, frozen=True):
 
     Attributes:
         id: its Zenoh id.
-        stand: its role. plans: this daemon plans; waits: another one plans; yields: another one
-            plans, and this one did before; looks: not known yet whether another one plans.
+        stand: its role. plans: this daemon plans; waits: another daemon plans; yields: another
+            daemon plans, and this one did before; looks: not known yet whether another daemon
+            plans.
     """
 
     id: ZenohId = ""
@@ -151,7 +152,7 @@ class DriveReport(Document, frozen=True):
 
 
 class BatteryReport(Document, frozen=True):
-    """The battery; levels are shares of a full one, null if unknown.
+    """The battery; levels are shares of a full battery, null if unknown.
 
     Attributes:
         level: its charge.
@@ -261,7 +262,7 @@ class MemberReport(Document, frozen=True):
     Attributes:
         name: name of the robot.
         state: state of its mission, in its last message.
-        heard_s: time since that message.
+        heard_s: time since its last message [s].
         away: why it gets no part of the remaining cells; null if it gets one.
         swept_cells: cells swept by it that this robot need not sweep.
     """
@@ -303,7 +304,7 @@ class Status(Document, frozen=True):
 
     robot: Name = ""
     version: str = ""
-    state: State = ""
+    state: StateName = ""
     reason: str = ""
     claim: ClaimReport = ClaimReport()
     uptime_s: Amount = 0.0

@@ -38,7 +38,7 @@ class EarlySample(msgspec.Struct, frozen=True):
 
 
 class TakenSample(msgspec.Struct, frozen=True, array_like=True):
-    """A sample that was taken.
+    """A sample that a cycle took.
 
     Attributes:
         topic: its topic.
@@ -60,7 +60,7 @@ class PlanTaken(msgspec.Struct, frozen=True, array_like=True):
         number: number of the request.
         seconds: how long it took.
         stops: numbers, from 1, of the stop checks at which the planner was stopped; a replay stops
-            at the same ones. A repair and the search after it may each have been stopped.
+            at the same checks. A repair and the search after it may each have been stopped.
         work: its ants, kicks and proposals.
         checksum: CRC-32 of its cells, int32 (row, col), little endian.
     """
@@ -97,8 +97,8 @@ class Cycle(msgspec.Struct, frozen=True, omit_defaults=True):
     Attributes:
         number: number of the cycle.
         is_begun: whether there is a mission; earlier events are held for it.
-        samples: in the order they were taken in.
-        patches_lost: map updates that were lost before them.
+        samples: the samples, in the order in which the cycle took them.
+        patches_lost: number of map updates that were lost before these samples.
         commands: number and document of each.
         plan: the finished plan.
         decided: the decisions.
@@ -117,10 +117,10 @@ class TurnBatch(msgspec.Struct, frozen=True, omit_defaults=True):
     """Consecutive cycles.
 
     Attributes:
-        first: number of the first one, from 1.
+        first: number of the first cycle, from 1.
         times: time of each, by the daemon's monotonic clock [s].
         turns: cycles with any input or decision.
-        beginning: only in the first batch.
+        beginning: the state at the start; only in the first batch.
         told: poses and small maps received in these cycles, in order, encoded as in ``samples``: on
             a busy link a recorder may miss some of them.
         kernels: name of the compiled kernels; only in the first batch with a mission.
@@ -138,7 +138,7 @@ def decode_turns(payload: bytes) -> TurnBatch:
     """Return the batch in JSON.
 
     Raises:
-        MalformedMessage: it is no batch.
+        MalformedMessage: the payload is not a batch.
     """
     try:
         return msgspec.json.decode(payload, type=TurnBatch)

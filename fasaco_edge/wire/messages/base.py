@@ -1,9 +1,8 @@
 """Messages of the robot's base, for a small program: laser scans in, velocities out.
 
-A scan is ranges and angles of sensor_msgs/LaserScan. As REP 117 has it, a range may be infinite
-(nothing in reach), minus infinite (too near to measure) or NaN (the measurement failed): these are
-no faults of a message. Intensities are not used. A velocity is a geometry_msgs/Twist, or a
-TwistStamped.
+A scan is ranges and angles of sensor_msgs/LaserScan. By REP 117, a range may be infinite (nothing
+in reach), minus infinite (too near to measure) or NaN (the measurement failed): such a message is
+valid. Intensities are not used. A velocity is a geometry_msgs/Twist, or a TwistStamped.
 """
 
 from __future__ import annotations
@@ -69,7 +68,7 @@ def decode_scan(payload: bytes) -> LaserScan:
     """Return the scan in a sensor_msgs/LaserScan.
 
     Raises:
-        MalformedMessage: it is no such message, has no beams or more than ``MAX_SCAN_BEAMS``, or
+        MalformedMessage: it is not such a message, has no beams or more than ``MAX_SCAN_BEAMS``, or
             its angles or its limits of ranges are invalid.
     """
     reader = CdrReader(payload, LASER_SCAN)

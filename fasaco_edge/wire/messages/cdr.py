@@ -4,7 +4,7 @@ Sources: OMG DDS-RTPS 2.5, clause 10 (encapsulation header); OMG CORBA 3.4, clau
 (transfer syntax); OMG DDS-XTypes 1.3, clause 7.6.3.1.2 (the header's padding count).
 A primitive of n bytes is aligned to n, counted from the first byte after the header.
 
-Also the fields that messages share: header and pose.
+The module also reads and writes header and pose, which many messages contain.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def encoded_string(value: str, message: str, field: str) -> bytes:
     """Return ``value`` in UTF-8 with its NUL.
 
     Raises:
-        MalformedMessage: it is too long, holds a NUL, or has no UTF-8.
+        MalformedMessage: it is too long, holds a NUL, or cannot be encoded in UTF-8.
     """
     try:
         text = value.encode()
@@ -122,7 +122,7 @@ class CdrReader:
 
         Args:
             layout: little endian, of the formats i, I and f.
-            names: of the numbers, each with ``{}`` in place of ``field``.
+            names: names of the numbers, each with ``{}`` in place of ``field``.
             field: the field that they are part of.
         """
         start = self._offset + (-self._offset & 3)

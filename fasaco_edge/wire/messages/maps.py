@@ -156,7 +156,7 @@ def coverage_values(states: NDArray[np.uint8], visits: NDArray[np.uint16]) -> ND
     """Return the values, int8 (rows, cols), of a coverage grid.
 
     Args:
-        states: uint8 (rows, cols), the lattice's: UNKNOWN, BLOCKED or COVERABLE.
+        states: uint8 (rows, cols), as in the lattice: UNKNOWN, BLOCKED or COVERABLE.
         visits: uint16 (rows, cols), passes of the tool over each cell.
     """
     values = np.full(states.shape, CoverageValue.UNKNOWN, np.int8)

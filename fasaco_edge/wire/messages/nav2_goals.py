@@ -80,7 +80,7 @@ def encode_goal(
 
     Args:
         goal_id: ``GOAL_ID_BYTES`` unique bytes.
-        points: of the path [m], at least two; each pose faces the next one, or away from it.
+        points: points of the path [m], at least two; each pose faces the next, or away from it.
         frame: frame of the points.
         stamp_ns: stamp of the path [ns]; 0 for the newest transform.
         plugins: as many names as the server's release has, see ``ros_keys.RELEASES``.

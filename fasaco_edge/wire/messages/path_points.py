@@ -13,7 +13,7 @@ from fasaco_edge.wire.limits import MAX_PATH_POSES
 from fasaco_edge.wire.messages.cdr import POSE, CdrReader, check_pose, read_header, refuse, yaw_of
 from fasaco_edge.wire.schemas import PATH
 
-# Poses are read this many at a time.
+# Number of poses read at a time.
 CHUNK = 500
 
 LEAST_POSE_BYTES = 72
@@ -42,7 +42,7 @@ class PathPoints:
         """Return the next points [m], at most ``most``.
 
         Raises:
-            MalformedMessage: a pose is invalid or in another frame, or data follow the last one.
+            MalformedMessage: a pose is invalid or in another frame, or data follow the last pose.
         """
         return [(pose[0], pose[1]) for pose in self._take(most)]
 

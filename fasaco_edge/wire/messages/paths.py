@@ -86,8 +86,8 @@ def decode_path(payload: bytes) -> PathMessage:
     """Return the path in a nav_msgs/Path.
 
     Raises:
-        MalformedMessage: it is no such message, has over ``MAX_PATH_POSES`` poses, or a pose names
-            another frame than the path; a pose need not name any.
+        MalformedMessage: it is not such a message, has over ``MAX_PATH_POSES`` poses, or a pose
+            names another frame than the path; a pose may name no frame.
     """
     reader = CdrReader(payload, PATH)
     frame, stamp_ns = read_header(reader)

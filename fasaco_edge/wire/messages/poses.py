@@ -52,7 +52,7 @@ def decode_pose(payload: bytes, schema: str) -> StampedPose:
     Covariance and twist are skipped, not checked: publishers write NaN there for unknown.
 
     Raises:
-        MalformedMessage: it is no such message, or ``schema`` is no pose type.
+        MalformedMessage: the bytes are not such a message, or ``schema`` is not a pose type.
     """
     if schema not in _AFTER_POSE:
         known = ", ".join(_AFTER_POSE)
@@ -86,7 +86,7 @@ LEAST_TRANSFORM_BYTES = 80
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """A received transform: the pose of a frame in another one.
+    """A received transform: the pose of a frame in its parent frame.
 
     A robot also sends the rotations of its wheels and cameras, so ``placement`` is checked only
     when needed, in ``planar``.
@@ -131,7 +131,7 @@ def decode_transforms(payload: bytes) -> tuple[Transform, ...]:
     """Return the transforms in a tf2_msgs/TFMessage; there may be none.
 
     Raises:
-        MalformedMessage: it is no such message, or has over ``MAX_TRANSFORMS`` transforms.
+        MalformedMessage: it is not such a message, or has over ``MAX_TRANSFORMS`` transforms.
     """
     reader = CdrReader(payload, TF_MESSAGE)
     count = reader.length("transforms", LEAST_TRANSFORM_BYTES)
@@ -256,7 +256,7 @@ class TransformTree:
 
 
 def _placed(frame: Pose2D, pose: Pose2D) -> Pose2D:
-    """Return a pose in the parent of its frame; ``frame``: the pose of its frame in the parent."""
+    """Return ``pose``, given in a frame, in the parent frame; ``frame``: the frame's pose there."""
     cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
     return Pose2D(
         frame.x + cos * pose.x - sin * pose.y,
@@ -293,12 +293,12 @@ class PoseDecoder:
     def decode(
         self, payload: bytes, schema: str, *, is_static: bool = False, came_at: float = 0.0
     ) -> StampedPose | None:
-        """Return the pose; None for transforms without a new one.
+        """Return the pose; None for transforms without a new pose.
 
         ``schema``: "" if the sample names none; ``came_at``: time of arrival [s].
 
         Raises:
-            MalformedMessage: it is of no such type.
+            MalformedMessage: the payload is not a valid message of that type.
             TransformLoop: the frames form a loop.
         """
         schema = schema or self.schema

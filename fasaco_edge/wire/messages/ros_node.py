@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
+from fasaco_edge.states import row_of
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, clipped, write_header
 from fasaco_edge.wire.ros_keys import TRIGGER, attachment, attachment_of
@@ -44,14 +45,7 @@ def response_attachment(request: bytes, time_ns: int) -> bytes:
 
 
 OK, WARN, ERROR, STALE = range(4)
-LEVELS: Final = {
-    "waiting for map": WARN,
-    "waiting for pose": WARN,
-    "paused": WARN,
-    "degraded": WARN,
-    "blocked": ERROR,
-}
-"""Levels of the states that are not OK; a daemon that does not plan is STALE."""
+"""Levels of diagnostics; a daemon that does not plan is STALE."""
 IN_ORDER: Final = ("starting", "recording", "stopping")
 """The states of a recorder that are OK."""
 
@@ -60,7 +54,7 @@ def level_of(status: Status) -> int:
     """Return the diagnostic level of a status: ``OK``, ``WARN``, ``ERROR`` or ``STALE``."""
     if status.claim.stand != "plans":
         return STALE
-    level = LEVELS.get(status.state, OK)
+    level = row_of(status.state).level
     recorder = status.recorder
     is_recorded = recorder is None or recorder.state in IN_ORDER
     is_faulty = status.troubles or status.ledger.fault or not is_recorded

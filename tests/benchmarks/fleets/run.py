@@ -33,7 +33,6 @@ from fasaco_edge.mission.events import (
     PlanReady,
     PlanRequest,
     PoseReceived,
-    State,
 )
 from fasaco_edge.mission.path.plan_requests import most_s
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
@@ -42,6 +41,7 @@ from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
+from fasaco_edge.states import State
 
 TOOL_M, RADIUS_M, OVERLAP = 0.3, 0.18, 0.08
 SPEED_M_S, TURN_S = 0.25, 1.5

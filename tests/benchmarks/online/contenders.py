@@ -32,7 +32,7 @@ def _papers(name: str) -> Callable[[int], CoveragePlanner]:
 
 
 CONTENDERS = {
-    DAEMON: Contender(planner_for, False, "the daemon's: paths are repaired by local search"),
+    DAEMON: Contender(planner_for, True, "the daemon's: paths are repaired by local search"),
     "fasaco": Contender(_papers("fasaco"), True, "the paper's, 1,000 ants, on the living trail"),
     "fasaco-anew": Contender(_papers("fasaco"), False, "the same, each plan from scratch"),
     "aco": Contender(_papers("aco"), True, "velocity 1, on the living trail"),

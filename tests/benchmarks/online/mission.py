@@ -28,12 +28,12 @@ from fasaco_edge.mission.events import (
     PlanReady,
     PlanRequest,
     PoseReceived,
-    State,
 )
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import WorkLimit, ignore
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.states import State
 from tests.benchmarks.harness import planner_for
 from tests.benchmarks.judge import MOVES
 from tests.benchmarks.online.buildings import Building

@@ -15,7 +15,7 @@ import itertools
 import json
 import time
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +30,8 @@ from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.grids import read_grid
 from fasaco_edge.planners.paper.baselines import spiral_stc, stc, zigzag
-from fasaco_edge.planners.planner import SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem
-from tests.benchmarks.harness import WrongWalkError, grid_name, judged, planner_for
+from tests.benchmarks.harness import ProcessorBudget, WrongWalkError, grid_name, judged, planner_for
 
 # Of the instances, in steps a quarter-turn.
 TOUR_PRICE = 50.0
@@ -107,17 +106,6 @@ class TurnsRun:
     wall_s: float
 
 
-@dataclass(slots=True)
-class _ProcessorBudget:
-    """Stop after some seconds of this thread's processor time."""
-
-    seconds: float
-    began: float = field(default_factory=time.thread_time)
-
-    def __call__(self, progress: SearchProgress) -> bool:
-        return time.thread_time() - self.began >= self.seconds
-
-
 def measure(plan: TurnsPlan, say: Say) -> Generator[TurnsRun, None, None]:
     """Yield every run, kernels warm.
 
@@ -130,7 +118,7 @@ def measure(plan: TurnsPlan, say: Say) -> Generator[TurnsRun, None, None]:
     warm_up()
     for name, problem, known in posed:
         say(f"{name}: warming up")
-        planner_for(plan.seed).plan(problem, _ProcessorBudget(WARM_S))
+        planner_for(plan.seed).plan(problem, ProcessorBudget(WARM_S))
         for budget_s in plan.budgets:
             say(f"{name}: {budget_s:g} s")
             yield _run(name, problem, known, budget_s, plan.seed)
@@ -140,7 +128,7 @@ def _run(
     name: str, problem: CoverageProblem, known: dict[str, Any], budget_s: float, seed: int
 ) -> TurnsRun:
     began = time.perf_counter()
-    path = planner_for(seed).plan(problem, _ProcessorBudget(budget_s))
+    path = planner_for(seed).plan(problem, ProcessorBudget(budget_s))
     wall_s = time.perf_counter() - began
     judged(problem, path)
     cost_s, bound_s, best_s = path.cost_s, path.lower_bound_cost_s, known.get("tour_best")

@@ -47,6 +47,7 @@ OPTIONS = {
     "tool_m": "width of its tool [m]",
     "turn_radius_m": "tightest arc of the own base [m]; 0 if it turns on the spot",
     "left_m": "how far the robot is to the left of where its follower takes it to be [m]",
+    "swept": "share of the floor that is asked for; 0 for what is worth its time",
 }
 
 

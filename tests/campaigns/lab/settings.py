@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from fasaco_edge.config.config import DaemonConfig, ScanConfig
+from fasaco_edge.config.config import DaemonConfig, PlannerConfig, ScanConfig
 from fasaco_edge.config.robot import RobotConfig
 
 TICK_S = 0.05
@@ -45,6 +45,7 @@ class LabSettings:
             matcher of others.
         turn_radius_m: of the base's tightest arc [m]; 0 if it turns on the spot. Of the own base.
         left_m: how far the robot is to the left of where its follower takes it to be [m].
+        swept: ``planner.swept`` of the product's configuration; 0 for null.
     """
 
     seed: int = 1
@@ -64,6 +65,7 @@ class LabSettings:
     own: str = ""
     turn_radius_m: float = 0.0
     left_m: float = 0.0
+    swept: float = 0.0
 
     def __post_init__(self) -> None:
         """Check rates and lengths.
@@ -102,7 +104,9 @@ class LabSettings:
     @property
     def config(self) -> DaemonConfig:
         """The product's configuration."""
-        return DaemonConfig(robot=self.robot, scan=ScanConfig() if self.scan else msgspec.UNSET)
+        scan = ScanConfig() if self.scan else msgspec.UNSET
+        planner = PlannerConfig(swept=self.swept or None)
+        return DaemonConfig(robot=self.robot, planner=planner, scan=scan)
 
 
 def stamp_ns(now: float) -> int:

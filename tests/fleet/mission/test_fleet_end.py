@@ -100,8 +100,8 @@ def test_cells_tried_in_vain_stay_the_others_despite_new_maps():
     ours.cannot = other.cannot = {(12, 5)}
 
     def untried():
-        area = ours.mission.map.area
-        return ours.mission.company.untried(area.reachable, area)[area.lattice.local((12, 5))]
+        lattice = ours.mission.map.area.lattice
+        return ours.mission.orders.cells.untried(lattice.window)[lattice.local((12, 5))]
 
     while untried():
         fleet.tick()

@@ -138,7 +138,7 @@ def members():
     ledger = MissionLedger(CELL, CELL, shared=SharedProgress())
     ledger.move_to("map")
     ledger.shared.begin_epoch(1)
-    members = Members("r1", ledger, CELL)
+    members = Members(ledger, CELL)
     members.receive(LARGER, 1.0)
     return members
 

@@ -49,7 +49,7 @@ def area():
 
 @pytest.fixture
 def members():
-    return Members("r1", MissionLedger(CELL_M, CELL_M, shared=SharedProgress()), CELL_M)
+    return Members(MissionLedger(CELL_M, CELL_M, shared=SharedProgress()), CELL_M)
 
 
 # Two discs of 0.1 m, and 0.1 m between them: the cell of its place, and the four beside it.
