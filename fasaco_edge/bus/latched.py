@@ -1,10 +1,10 @@
 """Subscriber of a latched key: gets the cached samples on joining, and recovers a lost last sample.
 
-Zenoh's advanced subscriber (1.10) does the same, but once a second, until the session ends, it
-queries every publisher that ever existed, even for undeclared subscribers. This subscriber queries
-a bounded number of publishers that exist, found by their liveliness tokens, each at most once a
-second. So open queries and memory stay bounded, whatever the number of publishers over time.
-``sample_order`` schedules the queries, and orders samples and replies.
+Zenoh's advanced subscriber (1.10) does the same, but it queries every publisher that ever existed,
+once a second until the session ends, and goes on with that after the subscriber was undeclared.
+This subscriber queries a bounded number of publishers that exist, found by their liveliness tokens,
+each at most once a second. So open queries and memory stay bounded, whatever the number of
+publishers over time. ``sample_order`` schedules the queries, and orders samples and replies.
 
 For the same reason it queries tokens and does not subscribe to them: each key that a subscriber
 has ever received stays in the memory of its session and of its router.
@@ -208,7 +208,7 @@ class Asker:
             with self._changed:
                 if not (self._is_woken or self._is_ending):
                     waits_s = next_at - time.monotonic()
-                    # A short delay sends queries that are due soon together.
+                    # Waits a little, so that queries due at almost the same time are sent together.
                     self._changed.wait(None if waits_s == float("inf") else max(waits_s, 0.05))
                 if self._is_ending:
                     return

@@ -39,8 +39,8 @@ CHANGEABLE = frozenset(
         "robot.steered_deg",
     }
 )
-# Exceptions in these sections: they determine the ledger's cells, the shares of memory, or what
-# opened session, ledger or another process.
+# Keys of these sections that need a restart all the same: they decide the ledger's cells or the
+# shares of memory, or were used to open session or ledger, or to start another process.
 FIXED = frozenset(
     {
         "planner.line",

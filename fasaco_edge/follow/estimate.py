@@ -2,9 +2,9 @@
 
 Poses arrive about ten times a second, and commands are sent twenty times a second. The delay is the
 time from a command to the arrival of a pose that shows its effect. The estimate is the pose after
-all sent commands have taken effect: the newest pose, advanced by all commands sent later than one
-delay before it arrived. The delay is measured when the robot starts, brakes and turns: it is the
-shift in time at which poses and commands fit best.
+all sent commands have taken effect. The newest pose shows the commands sent up to one delay before
+it arrived; the estimate is this pose, advanced by all later commands. The delay is measured when
+the robot starts, brakes and turns: it is the shift in time at which poses and commands fit best.
 
 A pose far from the expected one is not accepted at once, so that a momentary error of the localiser
 does not turn the robot. After a jump, several poses that agree with each other are accepted.
@@ -85,8 +85,8 @@ class PoseEstimate:
         jump: distance [m] and angle [rad] of the newest pose from the expected one; None if it is
             accepted.
         measured: the newest accepted pose, unfiltered.
-        commanded: the motion by all commands up to the time of ``measured``: x, y [m] along the
-            measured headings, and turn [rad].
+        commanded: the motion that all commands up to ``measured`` should have caused: x, y [m],
+            computed with the measured headings, and turn [rad].
         delay: time from a command to the arrival of a pose that shows its effect [s].
     """
 

@@ -24,7 +24,7 @@ PERIOD_S = 1.0 / RATE_HZ
 ZEROS_S = 1.0
 # Distance of the point ahead that gives the path's direction [m].
 LEADS_M = 0.5
-# Distance from its leg beyond which the robot has left the path [m].
+# A robot that is farther than this from its present piece of the path has left the path [m].
 OFF_PATH_M = 0.3
 
 
@@ -132,7 +132,7 @@ class Follower(Supervision):
             self.state = FollowerState.DRIVEN
             return None
         if self._pursuit.is_lost:
-            self.state, self.detail = FollowerState.OFF_PATH, "it leads where the base cannot steer"
+            self.state, self.detail = FollowerState.OFF_PATH, "the base cannot steer to it"
         elif limit.speed == 0.0 and command == STAND and not self._pursuit.is_turning:
             self.state, self.detail, self.ahead = FollowerState.OBSTACLE, limit.why, limit.around
         return command

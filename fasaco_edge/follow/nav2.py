@@ -2,10 +2,11 @@
 
 A goal is a piece of the path that begins at the robot. The next goal is sent before the robot
 reaches the end of the last goal, so that Nav2 switches without a stop. Where the path returns to
-itself, the next piece begins only shortly before the last goal ends: a controller continues at the
-nearest part of a path, and would skip the rest of the last goal. The last pose of a goal has the
-heading of the path beyond it, so that the robot turns there until the next goal arrives. A robot
-that cannot turn on the spot gets pieces of a curve, each driven forward or backward as a whole.
+itself, the next piece begins only shortly before the present goal ends: a controller continues at
+the nearest part of a path, and would skip the rest of the present goal. The last pose of a goal has
+the heading of the path beyond it, so that the robot turns there until the next goal arrives. A
+robot that cannot turn on the spot gets pieces of a curve, each driven forward or backward as a
+whole.
 """
 
 from __future__ import annotations
@@ -42,18 +43,19 @@ BEGINNING_M = 1.0
 DRIVES_M = 0.15
 # A goal that Nav2 reports as done is not done if the robot is farther than this from its end [m].
 DONE_M = 0.5
-# Pause after an error before the next goal [s]. It doubles each time up to the maximum, until the
-# robot has moved PROGRESS_M [m], or the direction to the path's point LEADS_M ahead [m] changes.
+# Pause after an error before the next goal [s]. It doubles with each error, up to the
+# maximum. It starts again once the robot has moved PROGRESS_M [m], or once the path leads in
+# another direction, measured to its point LEADS_M [m] ahead of the robot.
 RETRY_S, MOST_RETRY_S = 1.0, 30.0
 PROGRESS_M, LEADS_M = 0.5, 0.5
-# A robot stands if it has moved less than MOVED_M [m] for STANDS_S, or near the end of its goal for
-# ARRIVED_S [s]. Then the result is queried again, as a reply may be lost; after GIVE_UP_S the goal
-# is given up.
+# A robot stands if it has moved less than MOVED_M [m] during STANDS_S [s], or, near the end of its
+# goal, during ARRIVED_S [s]. Then the result is queried again, as a reply may be lost; after
+# GIVE_UP_S [s] the goal is given up.
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
 # A server that ends a query for a result within this time, without a reply, is gone [s].
 GONE_S = 290.0
-# Time constant of the filter of the positions that show whether the robot stands [s].
+# Positions are filtered with this time constant [s], to find out whether the robot stands.
 STEADY_S = 1.0
 
 # Nav2 gives no error code if another client's goal has replaced a goal; Humble has no error codes.
@@ -157,7 +159,7 @@ class Nav2Follower(Supervision):
             self._fail(FollowerState.NO_NAV2, why, now)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
-        """Take in whether Nav2 accepted a goal; None without an answer, which cancels the goal."""
+        """Take in whether Nav2 accepted a goal; None if it did not answer, and then cancel it."""
         if self._pending is None or self._pending.id != goal_id:
             return
         goal, self._pending = self._pending, None
@@ -205,12 +207,13 @@ class Nav2Follower(Supervision):
             self._fail(FollowerState.GIVEN_UP, why, now)
         elif ending.status == CANCELED:
             self._is_canceled = True
-            self._fail(FollowerState.CANCELED, "goes on with a path elsewhere", now, for_good=True)
+            words = "drives on once the path leads in another direction"
+            self._fail(FollowerState.CANCELED, words, now, for_good=True)
         else:
             self._fail(FollowerState.NO_NAV2, "Nav2 does not know the goal: was it restarted?", now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
-        """Take in that a query for a result ended without a reply: if soon, the server is gone."""
+        """Take in that a result's query ended without a reply; if it ended soon, Nav2 is gone."""
         if waited_s < GONE_S:
             self.take_ending(goal_id, None, "its server has gone", now)
         elif self._active is not None and self._active.id == goal_id:

@@ -27,8 +27,8 @@ FINE_M = 0.025
 DECIMALS = 6
 # Approximate number of pixels processed at once in arrays of a byte or more per pixel.
 STRIP = 1 << 20
-# Largest distance of a step's bend from the centres of its two cells [cells]; margin for rounding
-# [pixels].
+# A step may bend around a corner: largest distance of the bend from the centres of the step's two
+# cells [cells]; margin for rounding [pixels].
 REACH_CELLS, REACH_PX = 2.5, 2.0
 
 
@@ -186,7 +186,7 @@ class PolygonsOnRaster:
         """Convert polygons (x, y) [m], one or more, to the raster of a geometry."""
         ends = np.cumsum([len(polygon) for polygon in polygons])
         points = np.array([corner for polygon in polygons for corner in polygon], np.float64)
-        # Rounded, as an error of the raster's corner could move an edge off or onto a pixel's edge.
+        # Rounded: else a tiny error of the raster's origin could move a border off or onto a pixel.
         cols, rows = (
             np.round(each, DECIMALS) for each in geometry.to_pixels(points[:, 0], points[:, 1])
         )
@@ -262,7 +262,7 @@ class Reach:
     def pixels_of(
         self, cells: NDArray[np.bool_], window: Window, geometry: GridGeometry
     ) -> Window | None:
-        """Return a window of pixels around cells that robot and tool reach; None without any.
+        """Return the window of pixels that robot and tool reach from ``cells``; None without cells.
 
         Args:
             cells: bool (rows, cols) of the window.

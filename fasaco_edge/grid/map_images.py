@@ -1,4 +1,4 @@
-"""Map images, decoded whole and processed in stripes of rows; the cell value of each level.
+"""Map images, decoded whole and processed in stripes of rows, and cell values of brightness levels.
 
 Pillow's decoded image takes one byte per grey pixel, and four per colour pixel. It is processed in
 stripes, which bounds the additional memory.
@@ -51,12 +51,12 @@ _SIZE_HINT = "save the part of the map that is to be covered, or the map with la
 SEEN_FREE, NEVER_SEEN = 254, 205
 
 RAW = (
-    "{} pixels of greys from 101 to 254 are unknown in mode raw, and black ones free: if black is "
-    "wall, write mode: trinary"
+    "in mode raw, {} pixels of greys from 101 to 254 are unknown, and black pixels are free: if "
+    "black means wall, write mode: trinary"
 )
 NEGATED = (
-    "negate: 1 turns white pixels into walls, and {} pixels of the grey 205, which map_saver "
-    "writes for never seen: if white is floor, write negate: 0"
+    "negate: 1 turns white pixels into walls, and {} pixels of the grey 205 as well, by which "
+    "map_saver means never seen: if white means floor, write negate: 0"
 )
 UNSEEN = (
     "{} pixels of the grey 205, which map_saver writes for never seen, are {} by the keys of the "
@@ -148,7 +148,7 @@ def read_image(path: Path, most_bytes: int | None = None) -> MapImage:
             f"{path}: not an image (PGM, PNG, BMP or JPEG)", hint="save it as PGM or PNG"
         ) from error
     except (OSError, ValueError, SyntaxError) as error:
-        # Only errors of the system and of short files are written for users.
+        # Only texts of OSError are clear to users: errors of the system, and files cut short.
         why = str(error) if isinstance(error, OSError) else "its content is damaged"
         raise MapFileError(
             f"{path}: not readable as an image: {why}",
@@ -219,7 +219,7 @@ def values_of(
 def settle(
     image: MapImage, values: NDArray[np.int8], mode: str, *, negate: bool, is_mask: bool
 ) -> str:
-    """Make map_saver's grey for never seen unknown; return a fault of the keys, "" for none.
+    """Set the value of map_saver's grey 205 to unknown; return a fault of the keys, "" for none.
 
     Args:
         image, mode, negate: content of the map file.
@@ -260,4 +260,5 @@ def yaw_in_degrees(yaw: float) -> str:
     """Return the fault of an origin's yaw of more than a full turn; "" for none."""
     if abs(yaw) <= 2.0 * math.pi:
         return ""
-    return f"origin's yaw is in radians, got {yaw:g}: if these are degrees, {math.radians(yaw):.4f}"
+    radians = f"{math.radians(yaw):.4f}"
+    return f"origin's yaw is in radians, got {yaw:g}: if these are degrees, write {radians}"

@@ -4,7 +4,7 @@ Free-standing furniture is ignored. Doors are narrow gaps between the ends of wa
 the end of a narrow passage (``kernels.rooms.doors``). Each door and mouth is cut, and each
 connected part is then a region. A region too small for a room is joined to a neighbour through its
 least certain door or mouth. On an incomplete map, a room is found once enough of its floor has been
-seen.
+seen; less floor, seen through a door, belongs to no room yet.
 """
 
 from __future__ import annotations
@@ -40,6 +40,9 @@ LONGEST_M, SMALL_M, THICK_M = 2.5, 0.6, 0.3
 # Around the edge of the explored floor, unknown pixels up to this distance belong to an unseen part
 # of the building [m].
 OPEN_M = 0.5
+# A region behind a door is half seen if the square of the length of its edge to unknown floor is at
+# least this multiple of its area.
+OPEN_RATIO = 4.0
 # Largest ratio of unknown to wall pixels beside free pixels. Above it the map does not mark walls,
 # and all pixels that are not free count as wall.
 MOST_UNMARKED = 4
@@ -54,6 +57,8 @@ _RING = [(row, _HALF) for row in range(1 - _HALF, _HALF + 1)] + [
 _DIRECTIONS = np.array(_RING) / np.sqrt((np.array(_RING) ** 2).sum(axis=1, keepdims=True))
 # Certainty of a cut by hand, above that of any door.
 _BY_HAND = 9.0
+# Number of a region that belongs to no room yet.
+_NOT_YET = -1
 # Pixels processed at once in arrays of larger types.
 BLOCK = 1 << 16
 _NO_LINK = (0.0, 0.0)
@@ -92,10 +97,17 @@ def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) ->
     labels = find_areas(open_floor).labels
     del open_floor
     sizes = _counted(labels, free) * geometry.resolution**2
-    rooms, count = _numbered(_joined(doors, beside_cuts(labels, doors), sizes))
+    edges = _counted(labels, free & beside(kinds == _UNKNOWN)) * geometry.resolution
+    regions = _Regions(doors, beside_cuts(labels, doors), sizes, edges)
+    regions.join_small()
+    rooms, count = _numbered(regions.rooms())
     whole = Window(0, 0, *labels.shape)
     for strip in whole.strips(BLOCK):
-        labels[strip.slices_in(whole)] = rooms[labels[strip.slices_in(whole)]]
+        at = strip.slices_in(whole)
+        room = rooms[labels[at]]
+        # Rooms do not grow over floor of a room that will be found later.
+        solid[at] |= room == _NOT_YET
+        labels[at] = np.maximum(room, 0)
     grow(labels, ~solid)
     labels[~free] = 0
     return FoundRooms(geometry, labels, count)
@@ -109,16 +121,21 @@ def _solid_and_doors(
     things = furniture(
         ~free, FurnitureLimits(round(LONGEST_M / pixel_m), SMALL_M / pixel_m, THICK_M / pixel_m)
     )
-    solid = ~free & ~things
-    pixels = RoomPixels(
-        clearances(solid, round(CLEAR_M / pixel_m)),
-        solid,
-        (kinds == _WALL) & ~things,
-        _unseen(kinds, pixel_m),
-    )
+    solid, unseen = ~free & ~things, _unseen(kinds, pixel_m)
+    walls = (kinds == _WALL) & ~things
     reach, passage = round(BESIDE_M / pixel_m), round(PASSAGE_M / pixel_m)
     limits = DoorLimits(DOOR_M / pixel_m, WALL_M / pixel_m, reach, passage)
-    return solid, find_doors(pixels, _DIRECTIONS, limits)
+    near = round(CLEAR_M / pixel_m)
+    clearance = clearances(solid, near)
+    doors = find_doors(RoomPixels(clearance, solid, walls, unseen), ~solid, _DIRECTIONS, limits)
+    if not unseen.any():
+        return solid, doors
+    # What is seen through a door narrows beyond it: as if unseen floor were free, it widens.
+    closed = solid & ~unseen
+    wider = clearances(closed, near)
+    pixels = RoomPixels(wider, closed, walls, unseen)
+    more = find_doors(pixels, (clearance != wider) & ~solid, _DIRECTIONS, limits)
+    return solid, np.concatenate([doors, more])
 
 
 def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -133,10 +150,10 @@ def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.f
 
 def _numbered(rooms: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
     """Return the room of each region, numbered in order of regions; and the number of rooms."""
-    names = dict.fromkeys(room for room in rooms.tolist() if room)
+    names = dict.fromkeys(room for room in rooms.tolist() if room > 0)
     numbers = np.zeros(len(rooms), np.int32)
     numbers[list(names)] = np.arange(1, len(names) + 1)
-    return numbers[rooms], len(names)
+    return np.where(rooms > 0, numbers[rooms], rooms), len(names)
 
 
 _UNKNOWN, _FREE, _WALL = 0, 1, 2
@@ -195,60 +212,91 @@ def _by_hand(cuts: Sequence[tuple[Point, Point]], geometry: GridGeometry) -> NDA
     return np.array(rows, np.float64).reshape(-1, 5)
 
 
-def _joined(
-    doors: NDArray[np.float64], beside: NDArray[np.int32], sizes: NDArray[np.float64]
-) -> NDArray[np.int32]:
-    """Return the room of each region, int32 (n,), 0 for none; small ones join a neighbour's room.
+class _Regions:
+    """Regions of free floor and the doors between them; small regions are joined to others.
 
     Args:
         doors: float64 (m, 5), see ``find_doors``.
         beside: int32 (m, 2), the regions on both sides of each door.
         sizes: float64 (n,), free floor of each region [m2]; entry 0 has no meaning.
+        edges: float64 (n,), length of each region's edge to unknown floor [m].
     """
-    downs, rights = doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1]
-    squares = downs * downs + rights * rights
-    # For each region, the most certain door to each other region.
-    links: list[dict[int, tuple[float, float]]] = [{} for _ in sizes]
-    certain = zip(beside.tolist(), doors[:, 4].tolist(), (-squares).tolist(), strict=True)
-    for (one, other), kind, narrow in certain:
-        if one and other and one != other:
-            best = max(links[one].get(other, _NO_LINK), (kind, narrow))
-            links[one][other] = links[other][one] = best
-    floor: list[float] = sizes.tolist()
-    into = list(range(len(sizes)))
 
-    def is_small(room: int) -> bool:
-        has_door = any(kind >= LEAST_SURE for kind, _ in links[room].values())
-        return floor[room] < (ROOM_M2 if has_door else WITHOUT_DOOR_M2)
+    def __init__(
+        self,
+        doors: NDArray[np.float64],
+        beside: NDArray[np.int32],
+        sizes: NDArray[np.float64],
+        edges: NDArray[np.float64],
+    ) -> None:
+        self._floor: list[float] = sizes.tolist()
+        self._edge: list[float] = edges.tolist()
+        # The region that each region was joined to; itself if to none.
+        self._into = list(range(len(sizes)))
+        # For each region, the most certain door to each other region.
+        self._links: list[dict[int, tuple[float, float]]] = [{} for _ in sizes]
+        downs, rights = doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1]
+        squares = downs * downs + rights * rights
+        certain = zip(beside.tolist(), doors[:, 4].tolist(), (-squares).tolist(), strict=True)
+        for (one, other), kind, narrow in certain:
+            if one and other and one != other:
+                self._link(one, other, (kind, narrow))
 
-    small = [(floor[room], room) for room, to in enumerate(links) if to and is_small(room)]
-    heapq.heapify(small)
-    while small:
-        size, room = heapq.heappop(small)
-        # Skip an outdated entry: the region was joined, has grown, or has no neighbours.
-        if into[room] != room or size != floor[room] or not links[room]:
-            continue
-        (kind, _), _, other = min(
-            (link, floor[there], there) for there, link in links[room].items()
-        )
-        if kind == _BY_HAND:
-            continue
-        into[room] = other
-        floor[other] += size
-        for third, link in links[room].items():
-            del links[third][room]
+    def _link(self, one: int, other: int, link: tuple[float, float]) -> None:
+        best = max(self._links[one].get(other, _NO_LINK), link)
+        self._links[one][other] = self._links[other][one] = best
+
+    def _has(self, region: int, least: float) -> bool:
+        """Return whether a region has a door or cut at least as certain as ``least``."""
+        return any(kind >= least for kind, _ in self._links[region].values())
+
+    def _is_half_seen(self, region: int) -> bool:
+        """Return whether a region is a part, seen through a door, of a room."""
+        edge = self._edge[region]
+        return self._has(region, LEAST_SURE) and edge * edge >= OPEN_RATIO * self._floor[region]
+
+    def _is_small(self, region: int) -> bool:
+        least = ROOM_M2 if self._has(region, LEAST_SURE) else WITHOUT_DOOR_M2
+        return self._floor[region] < least
+
+    def join_small(self) -> None:
+        """Join each small region through its least certain door, the smallest first."""
+        floor, links = self._floor, self._links
+        small = [(floor[one], one) for one, to in enumerate(links) if to and self._is_small(one)]
+        heapq.heapify(small)
+        while small:
+            size, region = heapq.heappop(small)
+            # Skip an outdated entry: the region was joined, has grown, or has no neighbours.
+            if self._into[region] != region or size != floor[region] or not links[region]:
+                continue
+            (kind, _), _, other = min(
+                (link, floor[there], there) for there, link in links[region].items()
+            )
+            if kind == _BY_HAND or (kind >= LEAST_SURE and self._is_half_seen(region)):
+                continue
+            self._join(region, other)
+            if links[other] and self._is_small(other):
+                heapq.heappush(small, (floor[other], other))
+
+    def _join(self, region: int, other: int) -> None:
+        self._into[region] = other
+        self._floor[other] += self._floor[region]
+        self._edge[other] += self._edge[region]
+        for third, link in self._links[region].items():
+            del self._links[third][region]
             if third != other:
-                best = max(links[third].get(other, _NO_LINK), link)
-                links[third][other] = links[other][third] = best
-        if links[other] and is_small(other):
-            heapq.heappush(small, (floor[other], other))
-    rooms = np.zeros(len(sizes), np.int32)
-    for region in range(1, len(sizes)):
-        room = region
-        while into[room] != room:
-            room = into[room]
-        into[region] = room
-        is_cut = any(kind == _BY_HAND for kind, _ in links[room].values())
-        if floor[room] >= (0.0 if is_cut else ROOM_M2) and floor[room] > 0.0:
-            rooms[region] = room
-    return rooms
+                self._link(third, other, link)
+
+    def rooms(self) -> NDArray[np.int32]:
+        """Return the room of each region, int32 (n,): 0 for none, or ``_NOT_YET``."""
+        rooms = np.zeros(len(self._floor), np.int32)
+        for region in range(1, len(rooms)):
+            room = region
+            while self._into[room] != room:
+                room = self._into[room]
+            self._into[region] = room
+            if self._floor[room] >= ROOM_M2 or (self._floor[room] and self._has(room, _BY_HAND)):
+                rooms[region] = room
+            elif self._floor[room] and self._is_half_seen(room):
+                rooms[region] = _NOT_YET
+        return rooms

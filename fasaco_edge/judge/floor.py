@@ -5,8 +5,8 @@ Its inputs are a map and a line of points, no cells, walks or planners.
 Reachable floor
     All pixels that the tool's disc touches at positions that the robot's disc can reach from the
     beginning of the line. The robot fits where its disc touches only known free pixels. A tool that
-    sticks out of the robot's disc touches no floor behind a wall: it touches only pixels that free
-    pixels, roughly within the tool's disc, connect with the robot's disc.
+    sticks out of the robot's disc touches no floor behind a wall: it touches a pixel only if free
+    pixels, roughly within the tool's disc, lead from the robot's disc to this pixel.
 Swept floor
     The reachable floor that the tool's disc passed over along the line, by the same rules.
 Illegal share
@@ -91,7 +91,7 @@ class FloorFigures:
         seconds: time of driving and turning [s].
         least_s: lower bound on ``seconds`` for any line that sweeps as much [s]: a tool of width w
             sweeps at most w l + pi w^2 / 4 along a line of length l, and turns are not counted. It
-            is as exact as the swept area, to a pixel along the border.
+            may be wrong by a pixel along the border, as the swept area may.
         seconds_per_m2: driving time per square metre swept [s/m2]; None if nothing was swept.
         patches_over_4_dm2: patches left that are larger than ``PATCH_M2``.
         largest_patch_m2: the largest patch left [m2].

@@ -161,7 +161,8 @@ class MissionConfig:
         speed_m_s: speed of the robot; 0 if not known [m/s].
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
             them with the walls, once their direction is certain.
-        given: the policy with its places in the map frame; None if ``policy`` has them there.
+        given: the policy as configured, with its places in the map frame; None if ``policy`` is
+            that policy.
     """
 
     footprint: Footprint

@@ -13,7 +13,7 @@ from fasaco_edge.grid.rooms import FoundRooms, find_rooms
 from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.offline.ground import Line
 
-# Largest distance between points on the line at which its room is determined [m].
+# Points at most this far apart along the line show in which room it is [m].
 PIECE_M = 0.05
 
 
@@ -22,7 +22,7 @@ class PlannedRoom:
     """A room with figures of a line in it, as in ``plan --rooms --json``.
 
     Attributes:
-        room: its number on this map, by its first pixel.
+        room: its number on this map: rooms are numbered in the order of their first pixels.
         area_m2: its free floor [m2].
         reachable_m2: the part of that floor that the tool can reach [m2].
         swept_share: swept share of the reachable floor; None if nothing is reachable.

@@ -4,8 +4,8 @@ A line is laid along each of two walks and annealed three times; then the better
 until the budget ends. The first walk and line are always completed, unless Ctrl-C cuts them. The
 steps do not depend on the budget, so a larger budget never gives a worse line (by its seconds, plus
 the price of unswept floor). If a share of the floor is requested, the first line is always annealed
-three times, to find the price of floor. A planner without local search searches for one walk until
-the budget ends.
+three times, to find out how much unswept floor must cost for this share. A planner without local
+search searches for one walk until the budget ends.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from fasaco_edge.planners.planner import (
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 
-# Limit on the proposals per cell of a search for a walk; then the search for the line gains more.
+# Limit on the proposals per cell of a walk's search: with more, searching for the line gains more.
 # Limit on all proposals of the first walk, which has no budget: some five seconds.
 PROPOSALS_A_CELL, FIRST_PROPOSALS = 10_000, 25_000_000
 # Number of stages after which two lines are compared.
@@ -49,7 +49,7 @@ class SearchEnd:
 
     Args:
         stop: ends all searches; None for never.
-        budget: ends all searches except for the first walk and line over the floor; None for no
+        budget: ends all searches but those for the first walk and the line along it; None for no
             limit.
         watch: called with the progress.
         bound: see below.

@@ -6,8 +6,8 @@ the folder; once it has grown, it records the compiled stages and continues as a
 Kernels that are damaged, or that other users could have written, count as missing.
 
 In parallel, a second compiler compiles the stages that share few kernels with the others. It writes
-to its own folder, as two writers would damage numba's index of a function. After its end the
-first compiler takes over the files of functions that it lacks, and compiles the rest.
+to its own folder, as two writers would damage numba's index of a function. When it has ended, the
+first compiler takes over the functions that it has not compiled itself, and compiles the rest.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ from fasaco_edge.planners.stages import APART, STAGES
 LOG = logging.getLogger(__name__)
 
 MODULE = "fasaco_edge.planners.compiling"
-# The compiler restarts above MOST_MB of memory, unless PLENTY_MB are available: restarts take a
-# third of the time. With the daemon's 45 MB, MOST_MB fits the unit's limit (MemoryHigh=): a fifth
-# of this memory is pages of libraries, which the system shares or reclaims.
+# The compiler restarts above MOST_MB of memory, unless PLENTY_MB are available: a third of the
+# whole time is spent on restarts. With the daemon's 45 MB, MOST_MB fits the unit's limit
+# (MemoryHigh=): a fifth of this memory is pages of libraries, which the system shares or reclaims.
 MOST_MB, PLENTY_MB = 270.0, 2000.0
 # Limit on restarts, in case a disk corrupts every file; 25 are usual.
 MOST_RESTARTS = 300
@@ -123,7 +123,7 @@ class CompilerProcess:
 
     @classmethod
     def start(cls, stages: Collection[str] = STAGES) -> CompilerProcess | None:
-        """Start the compiler; None if nothing is missing, or no folder keeps kernels (logged)."""
+        """Start the compiler; None if nothing is missing, or no folder can be used (logged)."""
         if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
             return None  # kernels are not compiled
         folder, why = chosen_folder(stages)

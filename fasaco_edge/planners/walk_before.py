@@ -22,7 +22,7 @@ def completed(
 
     Args:
         problem: the present problem.
-        framed: its ground.
+        framed: the problem's cells with a border, see ``FramedGround``.
         before: int32 (n, 2), the previous walk, cells (row, col).
         held: number of leading visits to keep if possible.
 
@@ -35,7 +35,7 @@ def completed(
 def completed_from(
     problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32], held: int
 ) -> NDArray[np.int32]:
-    """Return ``completed`` for the ``framed_cells`` of the previous walk, int32 (n,)."""
+    """Do as ``completed``, but take ``before`` as ``framed_cells`` returns it, int32 (n,)."""
     start = int(framed.framed(np.array([problem.flat_start], np.int32))[0])
     kept = np.empty(before.size + 2 * framed.ground.bound, np.int32)
     length = keep_legal(framed.ground, before, start, kept)

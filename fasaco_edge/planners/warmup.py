@@ -96,7 +96,7 @@ class TinyRoom:
         return search.plan(self.costly, _perturbed, ignore)
 
     def framed(self) -> tuple[FramedGround, NDArray[np.int32]]:
-        """Return the framed ground, and the walk as its indices."""
+        """Return the ground with a border, and the walk as indices of this ground's cells."""
         framed = FramedGround.of(self.costly)
         cells = (self.path.cells @ (self.lattice.window.cols, 1)).astype(np.int32)
         return framed, framed.framed(cells)

@@ -92,7 +92,7 @@ def chapters(data: RunData, states: Sequence[Span], end_s: float) -> tuple[Order
     """Return the orders of a recording, one or more, in order of time.
 
     Args:
-        data: data of its samples.
+        data: data of the recording's samples.
         states: states of the mission, in order.
         end_s: end of the recording [s].
     """
@@ -106,7 +106,7 @@ def chapters(data: RunData, states: Sequence[Span], end_s: float) -> tuple[Order
 
 
 def ordered_words(orders: Sequence[OrderChapter]) -> str:
-    """Return the zones that the figures of floor refer to, as " of A and B"; "" for all floor."""
+    """Return the zones whose floor was counted, as " of A and B"; "" if all floor was."""
     asked = [order.order.zones if order.order else [] for order in orders]
     names = dict.fromkeys(one_line(zone.name) for zones in asked for zone in zones)
     return f" of {' and '.join(names)}" if names and all(asked) else ""
@@ -124,7 +124,7 @@ def ordered_zones(data: RunData, orders: Sequence[OrderChapter]) -> tuple[Polygo
 
 
 def _zones(data: RunData, begin_s: float, end_s: float) -> tuple[ZoneReport, ...]:
-    """Return the zones in the last status between two times [s] that has some."""
+    """Return the zones of the last status with zones between two times [s]; () for none."""
     reported = (
         each.status.mission.zones
         for each in reversed(data.statuses)
@@ -134,7 +134,7 @@ def _zones(data: RunData, begin_s: float, end_s: float) -> tuple[ZoneReport, ...
 
 
 def _by_zones(zones: Sequence[ZoneReport]) -> OrderDocument | None:
-    """Return an order that was not recorded, from its zones; None without zones."""
+    """Rebuild an order that was not recorded from its reported zones; None without zones."""
     asked = [ZoneDocument(zone.name, list(zone.polygon) or None, zone.passes) for zone in zones]
     return OrderDocument(asked) if asked else None
 
@@ -143,7 +143,7 @@ def _held(
     data: RunData, states: Sequence[Span], end_s: float
 ) -> Iterator[tuple[str, float, float, str | None, MissionOrder | None]]:
     """Yield for each order its source, beginning and end [s], ending command, content."""
-    # Daemon or recorder may have been restarted during an order.
+    # An order may be older than the recording: then only the first statuses say who gave it.
     first_s = next((at_s for at_s, command in data.commands if command.name == "start"), end_s)
     reported = (each.status.mission.ordered for each in data.statuses if each.at_s < first_s)
     ordered, began, order = next(filter(None, reported), "itself"), 0.0, None

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
 
 SWEPT_BY_OTHERS = "swept by others"
-# A path sweeps a spot this far inside the edge of the tool [m].
+# A path leads over a spot if the spot lies at least this far inside the edge of the tool [m].
 NEAR_M = 0.02
 # The mission's reason for a path with the same walk and an improved line.
 POLISHED = "line polished"
@@ -61,7 +61,7 @@ class Spot(msgspec.Struct):
         words: the reason in full.
         missed_m: least distance from the tool's edge [m].
         nearest_s: time of that distance, since the recording began [s].
-        seen_s: beginning of the last period, up to the end, in which the map shows it free [s].
+        seen_s: time from which on the map shows it free until the end of the recording [s].
         patch_m2: area of the connected patch of unswept floor around it [m2].
     """
 
@@ -166,7 +166,7 @@ class _Judge:
             return self._spot("not known", words, swept=None)
         others = self._review.by_others
         if others is not None and self._is_in(others, floor.geometry):
-            return self._spot(SWEPT_BY_OTHERS, "swept by others of its fleet")
+            return self._spot(SWEPT_BY_OTHERS, "swept by other robots of the fleet")
         if not self._is_in(floor.reachable, floor.geometry):
             return self._out_of_reach(grid, footprint)
         return self._within_reach(floor)
@@ -211,8 +211,8 @@ class _Judge:
             col, row = geometry.to_pixels(self._x, self._y)
             away_m = np.hypot(cols + 0.5 - col, rows + 0.5 - row).min() * geometry.resolution
             words += (
-                f": it fits {away_m:.2f} m away at the nearest, "
-                f"its tool reaches {self._tool_m / 2:.2f} m"
+                f": the nearest place where it fits is {away_m:.2f} m away, "
+                f"and its tool reaches {self._tool_m / 2:.2f} m"
             )
         return self._spot("too narrow", words)
 
@@ -262,7 +262,7 @@ class _Judge:
             return self._spot("not known", f"{words}; {by}", swept=None)
         else:
             why = "not worth it"
-            words = "no path led over it: a detour was not worth the way, or did not fit"
+            words = "no path led over it: a detour to it was not worth the time, or found no room"
         spot = self._spot(why, f"{words}; {by}")
         spot.seen_s = None if math.isnan(seen_s) else round(seen_s, 3)
         return spot
@@ -272,8 +272,8 @@ class _Judge:
         data = self._data
         away_m = np.hypot(*(data.track[:, :2] - (self._x, self._y)).T)
         via_m, way_m = away_m[:-1] + away_m[1:], data.lengths_m
-        # The longest detour at full speed, at most as long as the way itself: a robot that hardly
-        # moved probably stood.
+        # The longest detour that is possible at full speed, but not longer than the way itself: a
+        # robot that hardly moved was probably standing still.
         speed_m_s = known_settings(data.config).robot.speed_m_s
         detour_m = np.clip(speed_m_s * np.diff(data.times) - way_m, 0.0, way_m)
         gaps = np.flatnonzero(~data.driven & (via_m <= way_m + detour_m + self._tool_m))

@@ -155,8 +155,9 @@ def _mission(view: RobotState, status: Status) -> Digest:
 
 
 def _share(zone: ZoneReport, room: RoomReport | None, status: Status) -> float | None:
-    """Return the done share of a zone: of the room's floor, as on the map; else of the order's
-    floor, if it has no other zone; else of the zone's cells, None if it has none."""
+    """Return which share of a zone is done. For a room it is the share of floor shown on the map;
+    for the only zone of an order, the share of the order's floor; else the share of the zone's
+    cells, None if it has no cells."""
     if room is not None and room.swept is not None:
         return room.swept
     floor = status.floor

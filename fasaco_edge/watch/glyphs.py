@@ -124,7 +124,7 @@ def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
 
 @lru_cache(maxsize=2 * len(_LOOKS) ** 2)
 def _style(_: ColorSystem, above: int, below: int) -> Style:
-    """Return a character's style, one for each colour system, as a style caches its rendering."""
+    """Return a character's style: one object per colour system, as it caches its rendering."""
     front, back = _LOOKS[above][0], _LOOKS[below][0]
     return Style(color=Color.from_rgb(*front), bgcolor=Color.from_rgb(*back))
 
@@ -192,7 +192,7 @@ class ScreenBlocks:
 
 
 def with_keys(line: Text, width: int, *keys: str) -> Text:
-    """Return a headline with as many of ``keys``, texts at its end, as fit into ``width``."""
+    """Return a headline, followed by as many of the texts ``keys`` as fit into ``width``."""
     for key in keys:
         if line.cell_len + len(key) + 3 <= width:
             line.append(f"   {key}", FAINT)

@@ -1,4 +1,4 @@
-"""Picture of a mission in half blocks: map, coverage, path and robot, and the view it shows."""
+"""Picture of a mission in half blocks, and the data that it shows: map, coverage, path, robot."""
 
 from __future__ import annotations
 
@@ -160,8 +160,8 @@ FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
 MOST_SAMPLES = 12
 # Length of the next part of the path, which is highlighted [m].
 NEXT_M = 3.0
-# If lanes are closer than this [pixels], only this length of the path is drawn [m], to show the
-# ground.
+# If lanes are closer than RESOLVED_PIXELS, only the first NEAR_M [m] of the path are drawn, so that
+# the ground stays visible.
 RESOLVED_PIXELS, NEAR_M = 2.0, 15.0
 
 Kinds = NDArray[np.uint8]
@@ -284,7 +284,7 @@ class MissionPicture:
             self._grids, self._frame = grids, None
             self._bounds = union_bounds(*(known_bounds(grid) for grid in grids if grid is not None))
         if self._bounds is None:
-            return None  # a robot alone is no picture
+            return None  # without a map or coverage, nothing is drawn
         pose = view.pose
         robot = None if pose is None else (pose.x, pose.y, pose.x, pose.y)
         bounds = union_bounds(self._bounds, robot) or self._bounds

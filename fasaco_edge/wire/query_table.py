@@ -19,7 +19,8 @@ class Query:
         schema: message type of the reply; "" for JSON.
         json: JSON Schema of the reply; "" for none.
         payload: JSON Schema of the query's payload; "" for none.
-        answered: ``at once``: with the newest sample; ``loop``: by the loop, with its decision.
+        answered: ``at once``: the reply is the newest sample; ``loop``: the daemon's loop replies
+            once it has decided.
         timeout_s: timeout of the reply [s].
         errors: codes of its errors, besides ``bad_query``.
     """

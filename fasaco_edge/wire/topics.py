@@ -133,8 +133,8 @@ COVERAGE = Topic(
 FLOOR = Topic(
     name="floor",
     direction="out",
-    when="floor was swept, every two seconds at most; again after ten seconds; only while there is "
-    "a subscriber",
+    when="floor was swept, every two seconds at most; repeated after ten seconds without a change; "
+    "only while there is a subscriber",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -145,8 +145,8 @@ FLOOR = Topic(
 UNSWEPT = Topic(
     name="unswept",
     direction="out",
-    when="floor was swept, or is left for another reason, every two seconds at most; again after "
-    "ten seconds; only while there is a subscriber",
+    when="floor was swept, or the reason why it is unswept has changed, every two seconds at most; "
+    "repeated after ten seconds without a change; only while there is a subscriber",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -157,8 +157,8 @@ UNSWEPT = Topic(
 PHEROMONE = Topic(
     name="pheromone",
     direction="out",
-    when="the trail has changed, twice a second at most; again after ten seconds; only while "
-    "there is a subscriber",
+    when="the trail has changed, twice a second at most; repeated after ten seconds without a "
+    "change; only while there is a subscriber",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.PHEROMONE_GRID,),
@@ -170,7 +170,7 @@ PHEROMONE = Topic(
 DIRECTIONS = Topic(
     name="directions",
     direction="out",
-    when="with each field of the living trail, only while there is a subscriber",
+    when="each time `pheromone` is published, only while there is a subscriber",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -215,8 +215,8 @@ COMMAND = Topic(
 TURNS = Topic(
     name="turns",
     direction="out",
-    when="the loop has run, twice a second at most; only for a subscriber that gets it from the "
-    "first cycle on",
+    when="the loop has run, twice a second at most; only for a subscriber that receives "
+    "the log complete, from the loop's first cycle on",
     speaker="robot",
     listeners=("recorder",),
     json="turns.json",
@@ -314,7 +314,8 @@ DRIVER = Topic(
 
 TOPICS = tuple(each for each in tuple(globals().values()) if isinstance(each, Topic))
 """All rows, in the order of this file."""
-# The turn log is last: once the daemon sees its subscriber, the recorder receives all others, too.
+# The turn log is last: once the daemon sees a subscriber to it, the recorder already receives all
+# other topics.
 RECORDED = (
     *(each for each in TOPICS if each.queues.recorder is not None and each is not TURNS),
     TURNS,

@@ -49,7 +49,7 @@ def test_each_shade_follows_the_thresholds(tmp_path, caplog):
         (
             {"mode": "raw"},
             [0, -1, -1],
-            "20 pixels of greys from 101 to 254 are unknown in mode raw",
+            "in mode raw, 20 pixels of greys from 101 to 254 are unknown",
         ),
         ({"negate": 1}, [0, 100, 100], "negate: 1 turns white pixels into walls, and 10 pixels"),
         ({"origin": [0, 0, 90]}, [100, -1, 0], "origin's yaw is in radians, got 90"),

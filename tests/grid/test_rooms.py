@@ -136,6 +136,31 @@ def test_a_room_half_seen_is_one():
     assert numbers(found, LEFT, (6.0, 1.7)) == [1, 2]
 
 
+def seen_through_the_door(x, y, far_m):
+    """Map of the left room and of what a scanner at (x, y) [m] sees of the right one."""
+    cells = two_rooms()
+    rows, cols = np.indices(cells.shape)
+    right, up = (cols + 0.5) * 0.05 - x, (rows + 0.5) * 0.05 - y
+    # The jambs of the door: at (4.25, 1.25) and (4.25, 2.15).
+    low, high = ((jamb - y) / (4.25 - x) for jamb in (1.25, 2.15))
+    is_seen = (cols < 86) | ((up > low * right) & (up < high * right) & (right < far_m))
+    cells[~is_seen] = UNKNOWN
+    return cells
+
+
+def test_a_room_seen_askew_is_not_joined():
+    # The floor seen narrows from the door on; it has 1.7 m2.
+    found = find_rooms(grid_of(seen_through_the_door(3.6, 0.7, 4.0)))
+    assert found.count == 2
+    assert len({*numbers(found, LEFT, (5.0, 2.5))}) == 2
+
+
+def test_little_floor_behind_a_door_is_no_room_yet():
+    # A strip of 0.4 m2 along the wall, seen from beside the door.
+    found = find_rooms(grid_of(seen_through_the_door(4.0, 0.4, 4.0)))
+    assert numbers(found, LEFT, (4.45, 2.6)) == [1, 0]
+
+
 def test_a_cut_by_hand_divides_a_room():
     cells = two_rooms()
     found = find_rooms(grid_of(cells), [((1.0, 0.2), (1.0, 3.2))])

@@ -218,7 +218,7 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -
         BadConfiguration: a file is a folder, its folder is missing or not writable, it is also an
             input, or two outputs are the same.
     """
-    # The functions of os.path do not raise for invalid names, as Path's methods do.
+    # The methods of Path raise for invalid names, the functions of os.path do not.
     taken = {os.path.realpath(file): "it is an input" for file in inputs}
     for file in filter(None, outputs):
         target = os.path.realpath(file)

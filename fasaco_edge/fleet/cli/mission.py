@@ -37,7 +37,7 @@ AT_ONCE = 64
 
 @dataclass(frozen=True, slots=True)
 class _Member:
-    """A robot's answer, None if it is not valid; the reason of a refusal, else ""."""
+    """A robot's answer (``document``; None if invalid), and why it refused ("" if it accepted)."""
 
     robot: str
     document: dict[str, object] | None
@@ -100,8 +100,8 @@ def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Sho
 def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
     """Return the sorted names of the robots of a fleet.
 
-    These are the robots that answer, and the robots from which these recently received messages: a
-    robot that is frozen, or has lost its network, may still drive.
+    These are all robots that answer, and all robots that sent a message to one of them recently: a
+    robot that does not answer, as it is frozen or has lost its network, may still drive.
     """
     statuses = []
     for reply in bus.get(f"{keys.base}/{VERSION}/*/@rpc/status", timeout_s):
@@ -140,7 +140,7 @@ def _member(robot: str, found: list[QueryReply]) -> _Member:
         return _Member(robot, document, "")
     refusal = tolerant(document, replies.Error)
     is_loss = refusal.code == WouldForget.code
-    yes = "; to forget these cells, give it with --yes" if is_loss else ""
+    yes = "; to forget these cells, repeat the command with --yes" if is_loss else ""
     return _Member(robot, document, f"refused: {refusal.message}{yes}", is_loss)
 
 

@@ -70,9 +70,9 @@ def _print(figures: FleetFigures) -> None:
                 ),
                 (
                     "swept",
-                    f"{figures.swept_m2:.1f} m2; after another robot: {figures.again_m2:.1f} m2 "
-                    f"swept again ({percent(figures.again_share)}), {figures.through_m2:.1f} m2 "
-                    "driven through",
+                    f"{figures.swept_m2:.1f} m2; of floor swept by another robot: "
+                    f"{figures.again_m2:.1f} m2 swept again ({percent(figures.again_share)}), "
+                    f"{figures.through_m2:.1f} m2 driven through",
                 ),
                 ("waited", f"{figures.waited_s:.0f} s in all"),
                 ("divisions", str(figures.divisions)),
@@ -104,7 +104,7 @@ def _print(figures: FleetFigures) -> None:
     console.print(table)
     console.print(
         "swept [m2]; through, again [m2]: driven through, or swept again, after another robot had "
-        "swept there. kB/s: messages to the fleet (in brackets the most over 5 s). plan ms: median "
-        "and 99 %, by the recorder's clock.",
+        "swept there. kB/s: messages to the fleet (in brackets the largest mean over 5 s). "
+        "plan ms: median and 99 %, by the recorder's clock.",
         style="dim",
     )

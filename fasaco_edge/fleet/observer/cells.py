@@ -159,7 +159,7 @@ def cells_of(tiles: Iterable[CellTile]) -> Cells:
 
 
 def together(parts: Iterable[Cells]) -> Cells:
-    """Return the cells of all parts once, int64 (n, 2), except parts far from earlier parts."""
+    """Return each cell of the parts once, int64 (n, 2), without parts far from earlier ones."""
     joined = np.zeros((0, 2), np.int64)
     for part in parts:
         both = np.concatenate([joined, part])

@@ -60,11 +60,11 @@ class Note(msgspec.Struct, array_like=True):
         state: state of its mission; "gone" once it is silent.
         x, y: its position in its map frame [m].
         waits_for: name of the robot that it waits for; "" for none.
-        division: number of its division.
+        division: number of the newest division of the cells that it knows.
         open_cells: number of cells known to it that are still to sweep.
         messages, bytes: number and bytes of its messages to the fleet.
         driven_m: distance driven [m].
-        plans_ms: time of each plan reported [ms].
+        plans_ms: how long each reported plan took [ms].
         entered: cells that it entered.
         swept, ground: whole tiles that have changed; all tiles if ``is_repeated``.
         is_repeated: whether this note repeats the content of earlier parts.
@@ -239,7 +239,7 @@ def read_notes(paths: Sequence[Path]) -> list[NoteBatch]:
         names = ", ".join(str(path) for path in paths)
         raise UnreadableRecording(
             f"{names}: holds no notes of a fleet",
-            hint="no robot came while it was recorded: check the fleet's name, and the endpoint",
+            hint="no robot sent anything meanwhile: check the fleet's name, and the endpoint",
         )
     if len({batch.run for batch in batches}) > 1:
         raise DifferentRuns(f"parts of different runs: {', '.join(map(str, paths))}")

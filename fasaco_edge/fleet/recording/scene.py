@@ -39,7 +39,8 @@ FLEET_RATES = {entities.FLEET_SHARES: 2_000, entities.RUN_CARD: 800}
 CHUNK_BYTES = 1_200
 # Overhead of a layer of cells [bytes].
 GRID_BYTES = 1_200
-# Largest number of pixels of all maps, four bytes each: each part begins with all maps.
+# Limit on the pixels of all maps together, of four bytes each: each file of a recording begins with
+# all maps.
 MOST_PIXELS = 2_000_000
 # The view is fitted again once the maps have grown by this share of their size.
 REFRAME = 0.15
@@ -252,7 +253,7 @@ class FleetScene:
         return self._anchor
 
     def _here(self, member: ObservedRobot, x: float, y: float) -> tuple[float, float]:
-        """Return the place of the drawing for a point of a robot's map frame [m]."""
+        """Return where to draw a point that is given in a robot's map frame [m]."""
         x, y = member.placed(x, y)
         anchor = self._anchored(x, y)
         return x - anchor.x, y - anchor.y

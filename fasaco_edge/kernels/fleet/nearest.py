@@ -1,4 +1,4 @@
-"""Nearest-neighbour walks over the parts of robots: an estimate of each robot's time for its part.
+"""Nearest-neighbour walks, each over one robot's part of the cells: they estimate its time there.
 
 A robot drives straight on while the cell ahead is its own and unswept; else it drives to its
 nearest unswept cell. All numbers are integers, so that results are equal on all machines.

@@ -2,9 +2,9 @@
 
 Annealing changes the shape of the line and keeps its order. Here a new edge joins two points
 nearby, and a stretch of the line is reversed (2-opt) or moved elsewhere (or-opt): ways between
-lanes get shorter and cross less. Two or three edges are replaced, all others stay, some driven
-backward. The gain is exact, as in ``line``. Only moves that gain are made: accepting losses, as
-annealing does, gained nothing more.
+lanes get shorter and cross less. Two or three edges are replaced, all others stay, some in the
+opposite direction. The gain is exact, as in ``line``. Only moves that gain are made: accepting
+losses, as annealing does, gained nothing more.
 
 Sources: G. A. Croes, A method for solving traveling-salesman problems, 1958 (2-opt); I. Or,
 Traveling salesman-type combinatorial problems, 1976 (or-opt).
@@ -39,7 +39,8 @@ class Exchange(NamedTuple):
 
     Attributes:
         olds, news: int64 (3, 4), four points for each edge: the point before it, its two ends, and
-            the point after it; NONE beyond the line's ends. Without a second end there is no edge.
+            the point after it; NONE beyond the line's ends. There is no edge if its second end is
+            NONE.
         size: int64 (1,): number of edges in each.
     """
 
@@ -93,7 +94,7 @@ def _copy_edges(
 
 @lean_inner_kernel
 def _prepare(floor: Floor, memory: MoveMemory, olds: int, news: int) -> tuple[int, int]:
-    """Prepare the capsules of the edges copied; return how many there are before and after."""
+    """Prepare the capsules of the copied edges; return the numbers of old and of new capsules."""
     scratch, taken, given = memory.capsules, 0, 0
     for at in range(0, olds, 2):
         taken += prepare_edges(scratch, taken, memory.before, at, at + 1, floor.tool)
@@ -112,8 +113,8 @@ def _near_px(floor: Floor, ends: NDArray[np.float64], count: int) -> float:
 
 @lean_inner_kernel
 def _gain(line: Line, floor: Floor, price: Price, memory: MoveMemory, edges: Exchange) -> float:
-    """Return the gain of an exchange [s]; 0.0 for none, for a blocked edge, or if clearance alone
-    would gain."""
+    """Return the gain of an exchange [s]; 0.0 if nothing is gained, if an edge is blocked, or if
+    there is a gain only because the new edges keep farther from walls."""
     points, old, new, count = line.points, memory.before, memory.after, edges.size[0]
     longer_s = _seconds(points, edges.news, count, price)
     longer_s -= _seconds(points, edges.olds, count, price)
@@ -147,7 +148,7 @@ def _sweep(line: Line, floor: Floor, memory: MoveMemory, edges: Exchange) -> Non
 
 @lean_inner_kernel
 def _turn_round(line: Line, first: int, last: int) -> None:
-    """Exchange next and previous of all points from one to another."""
+    """Swap the next and the previous point of each point from ``first`` to ``last``."""
     following, preceding = line.next, line.previous
     number = first
     while True:
@@ -187,7 +188,7 @@ def exchange_stretch(
         edges: working memory.
         b, c: first and last point of the stretch; another point precedes ``b``.
         e: the point to move it after; NONE to reverse it in its place.
-        is_turned: whether the stretch is driven backward.
+        is_turned: whether the stretch is then driven from its last point to its first.
 
     Returns:
         The gain [s]; 0.0 if the line is as before.
@@ -289,7 +290,7 @@ def _stretch(line: Line, order: LineOrder, bits: int, c: int, e: int) -> tuple[i
     before = line.previous[first]
     if first == last or before == NONE:
         return NONE, NONE
-    # ``e`` must be neither in the stretch nor at the ends of its edges.
+    # ``e`` must be neither in the stretch nor one of the two points next to it.
     if order.at[before] - 1 <= order.at[e] <= order.at[last] + 1:
         return NONE, NONE
     return first, last

@@ -16,7 +16,7 @@ from fasaco_edge.kernels.jit import inlined, lean_inner_kernel, lean_kernel
 RIM = 1e-7
 # The side of a block is 2 ** BLOCK pixels.
 BLOCK = 3
-# Counts of sweeps of pixels that the tool can never reach begin here.
+# For pixels that the tool can never reach, the count of sweeps starts at this number, not at 0.
 NEVER = 10_000
 
 # Columns of a prepared capsule: its lower and its upper end, and its right side, see ``right_of``.
@@ -162,7 +162,7 @@ def rows_of(scratch: Scratch, count: int, radius: float, rows: int) -> tuple[int
 def stretches_of(
     scratch: Scratch, i: int, cols: int, taken: int, given: int, radius: float
 ) -> tuple[int, int]:
-    """Fill in the stretches of row i before and after; return how many there are of each."""
+    """Fill in row i's stretches of the old and of the new capsules; return the number of each."""
     capsules, before, after = scratch.capsules, scratch.before, scratch.after
     olds = news = 0
     for number in range(taken + given):
@@ -203,7 +203,7 @@ def swept_more(
     Nothing is changed: only pixels under one set and not under the other are read.
 
     Args:
-        counts: int16 (rows, cols), of sweeps, with the capsules to remove.
+        counts: int16 (rows, cols), counts of sweeps that still include the capsules to remove.
         scratch: its first ``taken`` capsules are removed, and the next ``given`` added.
         taken, given: numbers of capsules to remove and to add.
         radius: of the tool [pixels].
@@ -282,7 +282,7 @@ def sweep(
 def sweep_edges(
     sweeps: Sweeps, edges: NDArray[np.float64], radius: float, times: int, scratch: Scratch
 ) -> None:
-    """Count edges, float64 (n, 4): y, x and y, x of their ends, in (``times`` 1) or out (-1)."""
+    """Add edges to the counts (``times`` 1), or remove them (-1); float64 (n, 4): y, x, y, x."""
     for number in range(len(edges)):
         edge = edges[number]
         sweep(sweeps, edge[0], edge[1], edge[2], edge[3], radius, times, scratch)

@@ -39,8 +39,8 @@ def _stretches_beside(
 ) -> int:
     """Find the stretches of a row of pixels outside reached cells; return twice their number.
 
-    ``bounds`` receives beginning and end of each, as columns of the map, whose first pixel is in
-    column ``first`` of the raster.
+    ``bounds`` receives beginning and end of each stretch, as columns of the map; column 0 of the
+    map is column ``first`` of the raster.
     """
     rows, cols = reached.shape
     per_cell = placement.ux * placement.ux + placement.uy * placement.uy
@@ -97,8 +97,8 @@ def count_free_beside(
     return count
 
 
-# One sum counts two things: pixels that are not free in the bits below KNOWN_BIT, known pixels in
-# the bits from it on.
+# One integer holds two counts: the bits below KNOWN_BIT count the pixels that are not free, the
+# bits from KNOWN_BIT on count the known pixels.
 KNOWN_BIT = 32
 NOT_FREE = (1 << KNOWN_BIT) - 1
 
@@ -121,7 +121,7 @@ class PixelSums(NamedTuple):
 
 @lean_inner_kernel
 def weigh(thresholds: Thresholds, weights: NDArray[np.int64]) -> None:
-    """Fill in the weight of a pixel of occupancy v in a count: int64 (256,), at ``v & 255``."""
+    """Fill in what a pixel adds to a count, int64 (256,): at ``v & 255`` for occupancy v."""
     for value in range(-128, 128):
         state = state_of(value, thresholds)
         weights[value & 255] = (state != COVERABLE) + ((state != UNKNOWN) << KNOWN_BIT)

@@ -44,7 +44,7 @@ PROPOSALS, PERTURBATIONS = 0, 1
 # No cells are given: the perturbation draws the cells that it changes.
 DRAWN = -1
 
-# Steps from a disc that ants have rebuilt to the rim of the area that is then improved.
+# After ants have rebuilt a disc, the cells up to this many steps around it are improved, too.
 AROUND_DISC = 2
 # Temperatures of an annealing, from 1 down to 1 / 5, in units of 1 / 1024.
 COOLING = np.round(1024 * 0.2 ** (np.arange(8) / 7)).astype(np.int64)
@@ -54,14 +54,14 @@ class PerturbationRules(NamedTuple):
     """Parameters of perturbations.
 
     Attributes:
-        limit: cells that a search for another end or a loop settles.
+        limit: the search for another end or for a loop stops after this many cells.
         proposals: proposals for each visit of the walk, or each cell of the surroundings.
         radius: steps from the changed cells to the rim of the surroundings; -1 for the whole walk,
             at temperature 0.
         temperature_us: temperature that an annealing begins with [us].
         acceptance_us: temperature at which a worse walk is kept [us].
         loops_of_256: out of 256 perturbations, how many change the end or add a loop.
-        ants_of_256: out of 256 perturbations, in how many ants rebuild a disc.
+        ants_of_256: out of 256 perturbations, the number in which ants rebuild a disc.
         strict: whether a walk of equal cost is reverted.
     """
 
@@ -85,7 +85,7 @@ class SearchMemory(NamedTuple):
         touched: int32 (n,), cells where the perturbation changed something.
         area: int32 (n,), surroundings of the touched cells.
         marked: int32 (n,), number of the last perturbation whose surroundings hold the cell.
-        work: int64 (2,), PROPOSALS, moves of ants among them, and PERTURBATIONS so far.
+        work: int64 (2,), number of PROPOSALS, which includes moves of ants, and of PERTURBATIONS.
     """
 
     saved: NDArray[np.int32]
@@ -136,7 +136,7 @@ def recall(ground: Ground, walk: Walk, prices: Prices, memory: SearchMemory) -> 
 
 @inlined
 def _change_way(tally: Tally, touched: NDArray[np.int32], cell: int, root: int, at: int) -> int:
-    """Change the steps on the way from ``root`` to ``cell``; list it from ``touched[at]`` on."""
+    """Change the steps on the way from ``root`` to ``cell``; list its cells in ``touched[at:]``."""
     while cell != root:
         before = tally.parent[cell]
         change_step(tally.times, cell, before)
@@ -265,8 +265,8 @@ def perturb(
         search: changed in place.
         rules: how to perturb.
         times: how often.
-        given: number of cells in ``memory.touched`` around which the walk is only improved; DRAWN
-            to draw the cells to change.
+        given: number of cells in ``memory.touched``: the walk is not changed at random, only
+            improved around these cells. DRAWN to change the walk at cells drawn at random.
         random: stream, uint64 (1,), not 0; advanced.
     """
     ground, walk, prices, tally, memory, colony = search

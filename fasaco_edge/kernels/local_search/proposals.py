@@ -5,7 +5,7 @@ move          what it does                                       steps
 ============  =================================================  ==============
 square flip   steps a-b and c-d become a-c and b-d, the part     0
               between is reversed (2-opt on a square)
-end flip      the part after a step a-b is reversed, where the   0
+end flip      the part after a step a-b is reversed, if the      0
               free end lies beside a
 corner flip   a spare visit moves to the opposite corner of its  0
               square
@@ -46,7 +46,7 @@ from fasaco_edge.kernels.random import draw, index_of
 # equal on all machines.
 EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536).astype(np.int64)
 
-# Number of 64 proposals at a spare visit that try to remove it.
+# Out of 64 proposals at a spare visit, this many try to remove the visit.
 REMOVALS_OF_64 = 40
 # Half of the proposals go where a gain is possible: to cells with spare visits.
 AT_SPARE_OF_256 = 128
@@ -150,9 +150,9 @@ def _drop_detour(state: _State, index: int) -> None:
 
 @inlined
 def _takes_flip(state: _State, first: int, delta: int) -> bool:
-    """Return whether a change of equal length is accepted, and count its cost.
+    """Return whether a change that keeps the walk's length is accepted; if so, count its cost.
 
-    Changes from a held visit on must gain.
+    A change that begins at a held visit is accepted only if it gains.
     """
     if delta >= 0 and first < state.prices.held:
         return False
@@ -244,8 +244,8 @@ def _added_by_flip(ground: Ground, prices: Prices, walk: Walk, first: int, last:
 def _is_flip(ground: Ground, walk: Walk, first: int, last: int, back: int, free_end: bool) -> bool:
     """Return whether visits ``first + 1`` to ``last`` can be reversed.
 
-    One of the two new steps is known to be there: between the last visits of both
-    parts if ``back``, else between the first ones.
+    A flip replaces two steps by two new ones. One of these is known to exist: that between the
+    second visits of both old steps if ``back``, else that between their first visits.
     """
     if first < 0 or last - first < 2:
         return False

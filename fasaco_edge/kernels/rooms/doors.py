@@ -6,7 +6,7 @@ pixels on both sides. If the far side has not been seen yet, the near side suffi
 may also be a corner or the side of a cabinet.
 
 The mouth of a passage separates rooms as a door does, although its jambs are corners: on one side
-the gap stays as narrow, and on the other the free space widens by much.
+the free space stays as narrow as in the mouth, and on the other side it becomes much wider.
 """
 
 from typing import NamedTuple
@@ -16,27 +16,28 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
 
-# Kinds of jambs, the better the higher: no wall; thick, or a corner; thin as far as it has been
-# seen; thin.
+# Kinds of jambs, from worst to best: no wall; a thick wall or a corner; a wall that is thin as far
+# as it has been seen; a thin wall.
 NONE, THICK, HALF_SEEN, THIN = 0, 1, 2, 3
 # Depth of a jamb that is examined [pixels], and how much of it must be occupied.
 DEPTH, LEAST_MARKS = 4, 3
-# A chord may run from edge to edge of two jambs. So walls are also sought along lines that are
-# turned by this slope, or shifted aside [pixels].
+# A chord may meet its jambs at their edges, not in the middle. So walls are also sought along lines
+# that are turned by this slope, or shifted aside [pixels].
 TURN, ASIDE = 0.2, 1.0
 # Largest change of a jamb's half thickness from one pixel of depth to the next [pixels].
 ASLANT = 1.2
-# Least sum of the kinds of both jambs: a thin one beside a corner, or two half seen.
+# Least sum of the kinds of both jambs: one thin and the other a corner, or both half seen.
 LEAST_SURE = THIN + THICK
 # How far a chord's middle may be from the middle of the gap [pixels].
 OFF_CENTRE = 2.0
-# Squared clearance relative to that in the mouth of a passage: at most EVEN in the passage, at
-# least MOUTH before it, within the passage's width. Where two passages cross, it is 2.
+# Squared clearance, relative to that in the mouth of a passage: inside the passage it is at most
+# EVEN; before it, not farther away than the passage is wide, it reaches at least MOUTH. Where
+# two passages cross, it is 2.
 EVEN, MOUTH = 1.3, 4.0
 # Squared clearance beside a door relative to that in the door: least ratio on the wider side, on
 # the other side, and on the other side if that is half seen.
 WIDER, OTHER, OTHER_HALF_SEEN = 1.32, 1.1, 0.8
-# Limit on the gaps that are examined: one pixel of each gap is enough.
+# Limit on the chords that are kept; a gap gives several, and one of them is enough.
 MOST_GAPS = 20_000
 
 
@@ -154,7 +155,7 @@ def _nearest_solid(pixels: RoomPixels, row: float, col: float) -> tuple[int, int
 
 @lean_inner_kernel
 def _jamb_along(pixels: RoomPixels, end: _Place, wall: float) -> int:
-    """Return the kind of the jamb that begins at the end of a chord, in that direction."""
+    """Return the kind of the jamb that continues a chord beyond its end, straight on."""
     marks, kind = 0, THIN
     left_before, right_before = 0.0, 0.0
     for depth in range(DEPTH):
@@ -289,7 +290,10 @@ def _door_at(
 
 @kernel
 def find_doors(
-    pixels: RoomPixels, directions: NDArray[np.float64], limits: DoorLimits
+    pixels: RoomPixels,
+    middles: NDArray[np.bool_],
+    directions: NDArray[np.float64],
+    limits: DoorLimits,
 ) -> NDArray[np.float64]:
     """Return the chords of all doors and mouths of passages, several of each, float64 (n, 5).
 
@@ -298,6 +302,7 @@ def find_doors(
 
     Args:
         pixels: what the pixels are.
+        middles: pixels through which chords are looked for, bool (rows, cols).
         directions: of the chords, unit vectors (row, col), float64 (m, 2), over half a turn.
         limits: on the size of a door.
     """
@@ -306,7 +311,7 @@ def find_doors(
     doors, count = np.empty((MOST_GAPS, 5)), 0
     for row in range(1, rows - 1):
         for col in range(1, cols - 1):
-            if not 4 <= pixels.clearance[row, col] <= most:
+            if not (middles[row, col] and 4 <= pixels.clearance[row, col] <= most):
                 continue
             if count < MOST_GAPS and _is_ridge(pixels.clearance, row, col):
                 count += _door_at(pixels, (row, col), directions, limits, doors[count])

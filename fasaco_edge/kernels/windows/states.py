@@ -1,4 +1,4 @@
-"""States of the program: apply a choice, merge equal states, drop the most expensive ones."""
+"""States of the dynamic program: apply a choice, merge equal states, drop the dearest ones."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ INDEX_BITS, INDICES = 16, 65535
 
 @inlined
 def take_incoming(base: NDArray[np.int16], first: int, spare: int) -> int:
-    """Rename the ends at two identifiers of the frontier; return their number."""
+    """Rename the ends at identifiers ``first`` and ``first + 1``; return how many there were."""
     found = 0
     for lane in range(2):
         mate = base[first + lane]
@@ -49,7 +49,7 @@ def _name(
     lanes: int,
     first: int,
 ) -> int:
-    """Append a side's identifiers to ``taken``, from ``first`` on; for -1, those at the rim."""
+    """Append a side's identifiers to ``taken``: ``first`` and the next; if -1, those at the rim."""
     for lane in range(lanes):
         at_rim = ident[cell, 2 * direction + lane]
         taken[size + lane] = at_rim if first < 0 else first + lane
@@ -192,7 +192,7 @@ def file_state(
     parent: int,
     code: int,
 ) -> int:
-    """File the state in ``scratch``, or its lower cost; return the number of states."""
+    """Add the state in ``scratch``, or lower an equal state's cost; return the number of states."""
     mask = states.table.size - 1
     stamp = states.clock[LAYER_STAMP]
     value = _hash(states.scratch_words, words)

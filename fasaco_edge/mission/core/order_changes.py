@@ -121,7 +121,7 @@ class OrderChanges:
                 raise OrderError(
                     f"{name} is for a robot alone; robots of a fleet share cells",
                     key="passes",
-                    hint=f"leave {name} out; of the angles auto and cross are allowed",
+                    hint=f"leave {name} out; for the direction of lanes, use auto or cross",
                 )
 
     def change_to(self, after: OrderState, now: float) -> PathUpdate | None:
@@ -171,7 +171,7 @@ class OrderChanges:
         self.orders.reach.record_keep_outs(before)
         if not self.map.is_kept_out:
             return None
-        # Near the zone's border the robot may reach floor outside, but by another path.
+        # Near the zone's border the robot may still reach floor outside, but not on the same path.
         self.map.set_path_cell(None)
         return self.route.stop("robot is in a keep-out zone", now)
 

@@ -1,4 +1,4 @@
-"""Fit of a ledger and a map: whether a ledger from before a restart is of the map's building.
+"""Fit of a ledger and a map: whether both, after a restart, belong to the same building.
 
 On a map of another building, obstacles are as frequent on covered cells as around them; on a map of
 the same building they are rare on covered cells. So the number of blocked covered cells is compared
@@ -13,9 +13,10 @@ with the ledger if the walls do not decide.
 Unknown cells, and cells outside the map, are no evidence, as a restarted mapper has seen little. A
 map that knows half of the covered cells without contradiction confirms the ledger for good.
 
-Measured on 13 buildings, 10 to 100 % of them covered, all robots starting at the same place of the
+Measured on 13 buildings, each 10 to 100 % covered; all robots started at the same place of the
 frame. In another building, complete maps reject 66 % of the ledgers (most of the rest overlap too
-little), and single scans of 3.5 m and 8 m reject 32 % and 47 %, more as the map grows. In the same
+little), and single scans of 3.5 m and 8 m range reject 32 % and 47 %. Grown
+maps reject more. In the same
 building, maps reject no ledger, even if moved by 0.1 m, and 2 % if moved by 0.22 m and 1 degree.
 With obstacles on 3 % of the covered cells they reject no ledger, on 10 % they reject 8 % of the
 ledgers. On a map that has moved by more than a cell, a ledger is as wrong as in another building,

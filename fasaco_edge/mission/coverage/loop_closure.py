@@ -40,7 +40,7 @@ from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 # A map has moved if LEAST_CELLS, and LEAST_SHARE of the known cells, change between free and
 # blocked. Doors and passers-by change fewer.
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
-# A map with this many coverable cells shows floor, and so gives evidence of walls.
+# A map with this many coverable cells shows enough floor to tell whether walls are elsewhere.
 LEAST_FLOOR = LEAST_CELLS
 # Motions up to STILL_M [m] and STILL_RAD [rad] are ignored.
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
@@ -158,7 +158,7 @@ def moved_mask(
 def uncertain_cells(
     before: LedgerSnapshot, motion: Motion
 ) -> Callable[[Cells, Cells], NDArray[np.bool_]]:
-    """Return a function of rows and columns: whether cells may be uncovered, bool (n,)."""
+    """Return a function of rows and columns: which cells are not surely covered, bool (n,)."""
 
     def inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:
         x, y = ((each.astype(np.float64) + 0.5) * before.cell_m for each in (cols, rows))
@@ -177,7 +177,7 @@ def uncertain_cells(
 def certain_floor(
     before: FloorSnapshot, motion: Motion
 ) -> Callable[[Tiles], list[tuple[TileKey, Bits]]]:
-    """Return a function that returns the tiles with uncertain pixels, without these pixels."""
+    """Return a function of tiles: those with uncertain pixels, after removal of these pixels."""
     known = _stacked(before.tiles)
 
     def left_of(tiles: Tiles) -> list[tuple[TileKey, Bits]]:
@@ -234,12 +234,12 @@ def _covered(
     return covered
 
 
-# Fewest cells that a shift of the map closes; maps that close fewer are not compared.
+# A map is compared with the previous one if at least this many free cells have become blocked.
 LEAST_CLOSED = 3
-# Shifts up to FARTHEST_PX along each axis are tried [pixels], on up to MOST_PIXELS.
+# Shifts of up to FARTHEST_PX [pixels] along each axis are tried, on at most MOST_PIXELS of walls.
 FARTHEST_PX, MOST_PIXELS = 4, 2000
-# A shift must move the share LEAST_ALIKE of these pixels into the previous walls, and a share
-# larger by BETTER than no shift does.
+# A shift is accepted if it moves at least the share LEAST_ALIKE of these pixels into the previous
+# walls. This share must also exceed the share without a shift by at least BETTER.
 LEAST_ALIKE, BETTER = 0.5, 0.2
 # If the shares of two shifts differ by less, the smaller shift is taken: along a corridor, the
 # shares of many shifts are alike.

@@ -37,7 +37,7 @@ class PoseScatter:
     """
 
     def __init__(self, corner_m: float) -> None:
-        """Start without a pose; ``corner_m``: least step beside a corner [m]."""
+        """Start without a pose; ``corner_m``: shorter steps [m] are never taken for a corner."""
         self.sigma_m = 0.0
         self._corner_m = corner_m
         self._before: tuple[Pose2D, ...] = ()

@@ -43,8 +43,8 @@ def lay(
         walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
         pose: pose of the robot, in or near the first cell.
         is_cut: whether the walk ends where a map has cut off the previous walk.
-        keeps: whether to keep parts of the line; False for a way to a place, as a polished line
-            over the same cells is much longer.
+        keeps: whether to keep parts of the line; False for a direct way to a place: there, a line
+            that was polished for sweeping would be much longer.
         beside: discs that such a way keeps clear of, see ``Route.beside``.
     """
     ahead.see(pose)
@@ -78,7 +78,7 @@ def lay(
 
 
 def lay_blocked(ahead: LineAhead, touched: Window) -> bool:
-    """Lay the parts that a map blocks again, over stands; return whether there are any.
+    """Lay anew, over stands, the parts that a map blocks; return whether there are any.
 
     Args:
         ahead: the line.
@@ -92,7 +92,8 @@ def lay_blocked(ahead: LineAhead, touched: Window) -> bool:
         if not ahead.is_clear(line.points[number], line.points[number + 1])
     ]
     if blocked[:1] == [0] and ahead.is_followed:
-        # A lead-out is never clear; do not add another lead-out with each map.
+        # The first edge may lead out of a blocked place, and then it is never clear: with each map,
+        # another such edge would be added.
         blocked = blocked[leads_out(floor, ahead.place, line.points[1]) :]
     if not blocked:
         return False

@@ -28,8 +28,8 @@ class PassDocument(StrictDocument, frozen=True, omit_defaults=True):
     Attributes:
         covers: `all` cells; `edge`, cells along walls and furniture; `rest`, after an `edge` pass,
             all other cells.
-        lanes: direction of the lanes: `auto`, the cheapest, or along the cells' rows if the next
-            pass is `cross`; `cross`, across the lanes of the pass before.
+        lanes: direction of the lanes: `auto` is the cheapest one, but along the cells' rows if the
+            next pass is `cross`; `cross` is across the lanes of the pass before.
         angle_deg: angle of the lanes to the x axis of the map frame, in place of `lanes` [deg].
         overlap: share of the tool's width by which lanes overlap, in place of the configured one.
         speed_m_s: speed of the robot, below its usual speed [m/s].
@@ -53,7 +53,7 @@ Passes = (
 
 
 def passes_of(document: Passes) -> tuple[int, tuple[Pass, ...]]:
-    """Return the number of passes, and the settings of each; () if all are usual."""
+    """Return the number of passes, and the settings of each; () if all have the defaults."""
     if isinstance(document, int):
         return document, ()
     passes = _passes(document)
@@ -96,7 +96,7 @@ def _item(each: Pass) -> object:
 
 
 def passes_words(document: Passes) -> str:
-    """Return passes as text that follows the name of what they cover; "" for one usual pass."""
+    """Return the words for passes, to follow a zone's name; "" for a single default pass."""
     number, passes = passes_of(document)
     if not passes:
         return f" {number} times" if number > 1 else ""

@@ -1,7 +1,7 @@
 """Map motion: coverage, reached cells, trail and path move with the map after a loop closure.
 
-The moved map arrives first, and only the next pose shows how it moved. Until then the state before
-the moved map is kept, as this map itself changes reach, trail and path.
+The moved map arrives first, and only the next pose shows how it moved. Until that pose
+comes, the state on the previous map is kept, as the moved map changes reach, trail and path.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState
 
 @dataclass(slots=True, eq=False)
 class PresentOrder:
-    """Owner of the order's state; the sequencer and its present part change it, others read it.
+    """Owner of the order's state; only the sequencer and its ``PresentPart`` change it.
 
     Attributes:
         state: the order and its progress.

@@ -126,7 +126,7 @@ class WorthFirst:
         return self.least > 0 or self.may_work_s < float("inf")
 
     def choose(self, cells: NDArray[np.bool_], window: Window) -> None:
-        """Choose which of the cells to cover, bool (rows, cols), the next plan covers."""
+        """Choose the next plan's cells among ``cells``, those still to cover, bool (rows, cols)."""
         is_alike = self._priorities(window) is None
         if is_alike or not self.first(cells, window).any():
             self.least = 0

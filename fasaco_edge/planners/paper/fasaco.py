@@ -199,7 +199,7 @@ def _walk_before(problem: CoverageProblem) -> NDArray[np.int32] | None:
 
 
 def _rules(config: ColonyConfig, problem: CoverageProblem) -> Rules:
-    # The index is the length of a move less 1, or a number of open neighbours, 0 to 3.
+    # ``powers`` is read at a move's length minus 1, or at a number of open neighbours, 0 to 3.
     reach = max(*config.velocities, 4)
     powers = np.array([(1.0 / (index + 1)) ** config.beta for index in range(reach)])
     cost = problem.cost

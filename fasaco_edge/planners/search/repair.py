@@ -34,15 +34,15 @@ from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_
 PERTURBATIONS_AT_ONCE = 8
 # Limit on the perturbations of a neighbourhood, in case no move can be proposed in it.
 MOST_PERTURBATIONS = 100
-# Proposals of a second repair, for the path ahead, as a share of the first repair's.
+# Share of the first repair's proposals that a second repair makes, which keeps the path ahead.
 FEW = 0.2
 
 # Attempts to improve a valid walk: stride between the first spots of two attempts; approximate
 # number of cells of a spot; number of passes over all spots without gain that ends the search.
 STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
-# Largest number of cells with a bound, and with a second repair for the path ahead: on larger
-# walks, the bound would dominate the time of a repair, and a second repair would double it.
+# Largest number of cells for which a lower bound is computed, and a second repair is made: with
+# more, the bound would take most of a repair's time, and a second repair would double this time.
 BOUNDED_CELLS = 2_000
 
 
@@ -95,7 +95,8 @@ def _steady(
     """Return a path that begins with ``held`` steps of the previous walk, if it is similarly good.
 
     A repair may change the path just ahead where a change farther ahead would gain as much. So only
-    the walk after these steps is repaired, with few perturbations, as more do not keep more steps.
+    the walk after these steps is repaired. Few perturbations are enough, as more of them would not
+    keep more steps.
     The result costs no more than the completed walk.
     """
     assert problem.before is not None
@@ -118,7 +119,7 @@ def _steady(
 
 
 class _Repair:
-    """A running repair, a generator of pauses like ``search.Search``.
+    """A running repair; like ``search.Search`` it can be paused between two pieces of work.
 
     Attributes:
         completed: int32 (n, 2), the walk's next cells before improvement.
@@ -249,8 +250,8 @@ def _changed(
 ) -> NDArray[np.int32]:
     """Return the new walk's cells at changed steps, int32 (n,), in its order.
 
-    A step is changed if one of the walks takes it more often. Steps driven meanwhile, which the old
-    walk lacks at its beginning, do not count.
+    A step is changed if one of the walks takes it more often. The steps that the robot
+    has driven meanwhile are not part of the old walk, so they do not count.
     """
     ground = framed.ground
     listed = np.empty(2 * (before.size + walk.size), np.int32)

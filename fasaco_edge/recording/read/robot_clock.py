@@ -27,8 +27,9 @@ from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 Seconds = NDArray[np.float64]
-# The simulation was restarted between two stamps if the second is earlier, or later by more than
-# this many times the expected time plus a second: there the recorder's clock counts.
+# If the second of two stamps is earlier than the first, or much later than expected, the simulation
+# was restarted between them, and the recorder's clock counts there. Much later: by more than this
+# many times the expected time plus a second.
 MOST_TIMES = 10.0
 
 

@@ -21,7 +21,7 @@ from fasaco_edge.wire.documents.replies import MissionReport
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.reasons import plain
 
-# Bytes of a path's point in the file: each path is drawn twice, also as the previous path.
+# Bytes of a path's point in the file: each path is drawn twice, later as the previous path.
 POINT_BYTES = 2 * 12
 # Time after which another plan of the same kind is logged at level INFO again.
 LOGGED_AGAIN_NS = 60_000_000_000

@@ -74,7 +74,8 @@ class RobotRecorder(BusRecorder):
         capacity = afforded_bytes(memory_limit())
         self._queue = SampleQueue(capacity, self._clock.arrival)
         if capacity < QUEUE_BYTES:
-            self.note(f"memory is limited: samples above {capacity / 1e6:.1f} MB are not recorded")
+            size = f"{capacity / 1e6:.1f} MB"
+            self.note(f"memory is limited: at most {size} of samples wait, others are lost")
         scene = self._scene
         self._drawers: dict[str, Callable[[Sample], None]] = {
             "map": lambda s: scene.add_map(decode_occupancy_grid(s.payload)),

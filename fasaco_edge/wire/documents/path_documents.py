@@ -157,8 +157,8 @@ class TrailAttachment(Document, frozen=True):
     Attributes:
         revision: revision of the path in force.
         cells: number of cells that the trail spans: cells with a step to another cell.
-        branching: mean number of directions of a cell that are close to its strongest: 1 if each
-            cell has a single one.
+        branching: mean, over the cells, of the number of directions whose pheromone is close to
+            that of the cell's strongest; 1 if one direction is dominant in each cell.
     """
 
     revision: Count = 0
@@ -167,8 +167,8 @@ class TrailAttachment(Document, frozen=True):
 
 
 PATH_DIGEST = "path_digest"
-"""Topic in a recording in place of a path: with the path's attachment and, as payload, the
-``digest`` of its points, float64 x, y [m]."""
+"""Topic that replaces a path's message in a recording: the attachment is the path's, the payload is
+the ``digest`` of its points, float64 x, y [m]."""
 DIGEST_BYTES = 16
 
 
