@@ -50,9 +50,15 @@ def cli(daemon: Daemon, *words: str) -> str:
 
 
 def test_rooms_are_named_ordered_and_known_again(tmp_path):
+    # A broken file of rooms is only a named fault.
+    broken = tmp_path / "state" / "robot.rooms.json"
+    broken.parent.mkdir()
+    broken.write_text("{}")
     with daemon_process(tmp_path, **IDLE) as running, Outsider(running.endpoint) as outsider:
         heard = outsider.listen("rooms")
         heard.wait(lambda sample: True)
+        status = outsider.wait_status(lambda status: status["errors"]["total"])
+        assert status["errors"]["by_code"] == {"rooms_file": 1}
         assert rooms_of(outsider) == {"frame": "", "revision": 0, "rooms": []}
         show(outsider)
         found = heard.wait(lambda sample: len(sample.json()["rooms"]) == 2).json()

@@ -65,6 +65,17 @@ def test_the_second_waits_in_silence_and_takes_over(base, tmp_path, ends, ros2):
     assert "Traceback" not in first_log.read_text() + second_log.read_text()
 
 
+def test_the_end_of_a_waiting_follower_changes_nothing(base, tmp_path):
+    first_log, second_log = tmp_path / "first", tmp_path / "second"
+    with follower_process(base.endpoint, first_log):
+        base.wait_until_it_moves()
+        with follower_process(base.endpoint, second_log):
+            until(lambda: SECOND in second_log.read_text())
+            count = len(base.heard)
+        time.sleep(1.0)
+        assert all(command.speed > 0.0 for _, command in base.heard[count:])
+
+
 def test_one_of_three_followers_started_together_drives(base, tmp_path):
     logs = [tmp_path / name for name in "abc"]
     with contextlib.ExitStack() as stack:

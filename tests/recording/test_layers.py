@@ -13,10 +13,11 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes
-from fasaco_edge.recording.scene.curves import PERIOD_NS, Curves
+from fasaco_edge.recording.scene.curves import OF_PATH, OF_STATUS, PERIOD_NS, Curves
 from fasaco_edge.recording.scene.drawings import LOGGED_AGAIN_NS, PathDrawing
 from fasaco_edge.recording.scene.layers import BURST_S, RATES, Anchor, Layers, size_in_file
 from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.status import BatteryReport, Status
 from fasaco_edge.wire.messages.paths import PathMessage
 from tests.support.recordings import SCALAR, TEXT, read_column, writer_in
 
@@ -102,6 +103,21 @@ def test_a_line_keeps_its_corners_and_loses_the_rest():
     assert archetypes.corners(lanes[[0, 1, 1, 2]]).tolist()[-1] == [2, 0]
     for count in (0, 1, 2):
         assert len(archetypes.corners(lanes[:count])) == count
+
+
+def test_a_curve_is_a_figure_a_sum_or_a_rate(tmp_path):
+    writer = writer_in(tmp_path)
+    curves = Curves(writer)
+    for second in range(0, 121, 40):
+        writer.at(second * SECOND_NS)
+        battery = BatteryReport(level=0.8)
+        curves.add(OF_STATUS, Status(uptime_s=second, cpu_s=0.1 * second, battery=battery))
+        curves.add(OF_PATH, PathAttachment(saved_by_ants_s=2.0))
+    assert writer.close()
+    (part,) = tmp_path.glob("*.rrd")
+    assert read_column(part, "metrics/resources/battery", SCALAR).values[0] == [80.0]
+    assert read_column(part, "metrics/resources/processor", SCALAR).values[0] == [10.0]
+    assert read_column(part, "metrics/saved/ants", SCALAR).values == [[2.0], [4.0], [6.0], [8.0]]
 
 
 def test_constants_are_drawn_rarely_and_changes_at_once(tmp_path):

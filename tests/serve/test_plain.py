@@ -38,6 +38,15 @@ def told(of: Status) -> list[str]:
     ]
 
 
+def test_a_state_looks_bad_where_people_have_to_help():
+    looks = {state: plain.look(status(state=state, troubles=[])) for state in STATES}
+    assert [state for state, look in looks.items() if look == "bad"] == ["blocked", "degraded"]
+    assert [state for state, look in looks.items() if look == "wait"] == ["paused"]
+    at_rest = ["idle", "waiting for map", "waiting for pose", "loading"]
+    assert [state for state, look in looks.items() if look == ""] == at_rest
+    assert plain.look(status(state="covering", troubles=[{"code": "no_pose"}])) == "bad"
+
+
 @pytest.mark.parametrize("state", STATES)
 def test_each_state_has_plain_words(state):
     """Whatever the reasons and troubles are."""

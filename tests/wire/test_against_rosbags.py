@@ -13,11 +13,19 @@ from tests.wire.facts import check_facts, facts_of
 from tests.wire.soundness import check_same
 from tests.wire.vectors import Vector, vectors
 
+# Their encoders leave members out, round headings, or place the lattice anew.
+REWRITTEN = ("battery_of_cells", "scan_with_intensities", "path", "pheromone")
+
 
 def headers_of(message: Any) -> list[Any]:
     """Return all headers of a message of rosbags."""
     inner = [*getattr(message, "poses", ()), *getattr(message, "transforms", ())]
     return [part.header for part in (message, *inner) if hasattr(part, "header")]
+
+
+def places_of(message: Any) -> list[Any]:
+    """Return the positions in a path of rosbags."""
+    return [part.pose.position for part in getattr(message, "poses", ())]
 
 
 def renamed(vector: Vector, frame: str) -> tuple[bytes, dict[str, Any]]:
@@ -45,4 +53,9 @@ def test_a_message_equals_that_of_rosbags(vector: Vector, frame: str) -> None:
     if schema in ENCODERS:
         ours = ENCODERS[schema](message)
         check_same(DECODERS[schema](ours), message)
-        assert oracle.to_bytes(schema, oracle.from_bytes(schema, ours)) == ours
+        theirs = oracle.from_bytes(schema, ours)
+        assert oracle.to_bytes(schema, theirs) == ours
+        assert ours == payload or vector.name.startswith(REWRITTEN)
+        # All poses of a path carry its frame and stamp.
+        assert all(header == theirs.header for header in headers_of(theirs))
+        assert places_of(theirs) == places_of(oracle.from_bytes(schema, payload))

@@ -165,7 +165,7 @@ def _inflated(body: bytes) -> bytes:
     if inflater.unconsumed_tail:
         raise ValueError(f"over {MOST_BYTES} bytes")
     if not inflater.eof or inflater.unused_data:
-        raise ValueError("the compressed data is incomplete")
+        raise ValueError("the compressed data is incomplete, or more follows it")
     return plain
 
 
