@@ -192,14 +192,16 @@ def _pace(args: argparse.Namespace, robot: RobotConfig) -> float:
 
     A time scale left over from a simulation would give a real robot a wrong clock.
     """
-    scale, pace = robot.time_scale, 1.0 if args.speed is None else args.speed
-    if args.speed is None and scale != 1.0:
-        raise BadConfiguration(
-            f"robot.time_scale is {scale:g}: that of a simulated robot",
-            hint=f"add --speed {scale:g} if the robot is simulated; else remove robot.time_scale",
-        )
+    pace, where = (
+        (robot.time_scale, "robot.time_scale") if args.speed is None else (args.speed, "--speed")
+    )
     if not 0.0 < pace <= MOST_PACE:
-        raise BadConfiguration(f"--speed must be above 0 and at most {MOST_PACE:g}, got {pace:g}")
+        raise BadConfiguration(f"{where} must be above 0 and at most {MOST_PACE:g}, got {pace:g}")
+    if args.speed is None and pace != 1.0:
+        raise BadConfiguration(
+            f"robot.time_scale is {pace:g}: that of a simulated robot",
+            hint=f"add --speed {pace:g} if the robot is simulated; else remove robot.time_scale",
+        )
     return pace
 
 
