@@ -91,6 +91,29 @@ def test_it_returns_before_the_way_home_not_from_there():
     assert np.hypot(*np.subtract(robot.at, (0.6, 0.6))) < CONFIG.footprint.cell_m
 
 
+def test_an_order_out_of_time_keeps_its_covered_cells():
+    ends = []
+    for share in (None, 0.99):
+        start = CommandReceived(1, "start", read_order({"until_min": 0.8}))
+        robot, _ = swept_flat(share, start)
+        assert "time is up" in robot.mission.reason
+        ends.append(robot.mission.coverage().covered)
+    # Its line sweeps more in passing, so it comes less far.
+    assert ends[1] > 0.8 * ends[0] > 0
+
+
+def test_the_same_order_given_again_begins_anew():
+    start = CommandReceived(1, "start", read_order({}))
+    robot, _ = swept_flat(1.0, start)
+    share = robot.mission.line.left.share
+    raised, least_m2 = share._raised, share._least_m2
+    assert raised > RAISED
+    assert least_m2 > 4.0
+    robot.tell(replace(start, number=2))
+    robot.drive()
+    assert (share._raised, share._least_m2) == (RAISED, 0.0)
+
+
 def test_as_few_cells_are_opened_as_suffice_with_a_margin():
     share = AskedShare(0.99)
     # 0.2 m2 are missing, so cells with 0.3 m2 are opened; the last cell has too little.
@@ -111,6 +134,7 @@ def test_a_return_that_gains_little_is_the_last_one_of_a_pass():
     assert not share.returns_to(Tally(0.6 - 0.5 * LEAST_GAIN * missing_m2), *found)
     assert share.returns_to(Tally(0.6 - 1.5 * LEAST_GAIN * missing_m2), *found)
     assert not share.returns_to(Tally(0.6), *found)
+    assert not share.why
     share.begin("second pass")
     assert share.returns_to(Tally(0.6), *found)
 
