@@ -16,6 +16,8 @@ from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.line import LINES
 from tests.mission.offset_base import small_flat
 from tests.mission.test_line import CONFIG, Robot
+from tests.mission.test_room_orders import BOTH, LOOKS, PERIOD_S
+from tests.mission.world import building, with_policy
 
 RETURNS = re.compile(r"returns for (0\.\d\d) of 4\.7 m2: (\d\d\.\d) % swept, takes \d+ s")
 
@@ -112,6 +114,21 @@ def test_the_same_order_given_again_begins_anew():
     robot.tell(replace(start, number=2))
     robot.drive()
     assert (share._raised, share._least_m2) == (RAISED, 0.0)
+
+
+def test_rooms_in_turn_are_all_covered_before_it_returns():
+    line = replace(LINES["quick"], swept=0.99)
+    sweeping = replace(CONFIG.sweeping, line=line)
+    robot = Robot(Mission(with_policy(replace(CONFIG, sweeping=sweeping), by_room="always")))
+    robot.at = 1.3, 1.3
+    robot.tell(MapReceived(building(*BOTH)))
+    for _ in range(LOOKS):
+        robot.now += 1.01 * PERIOD_S
+        robot.tell()
+    robot.finish()
+    reasons = [reason.partition(" for ")[0] for reason in robot.reasons]
+    assert reasons.index("floor planned first is done: the rest") < reasons.index("returns")
+    assert "99.00 % asked for: 99." in robot.mission.reason
 
 
 def test_as_few_cells_are_opened_as_suffice_with_a_margin():

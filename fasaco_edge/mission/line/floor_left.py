@@ -242,6 +242,9 @@ class UnsweptTally:
         if state.late or state.stage is Stage.RETURNING:
             # The order ends with this path: cells reopened now would count as not covered.
             return False
+        if self._orders.scope.is_first_done:
+            # The rest of the pass is covered before.
+            return False
         self._begin_part()
         found, pixels = np.unique(at, axis=0, return_counts=True)
         may_open = [self._ledger.may_open_again((row, col)) for row, col in found.tolist()]
