@@ -264,7 +264,7 @@ def test_a_plan_is_for_the_robot_of_a_configuration(plan, tmp_path):
     file = tmp_path / "robot.yaml"
     file.write_text(
         "robot: {tool_width_m: 0.36, radius_m: 0.2, speed_m_s: 0.4, turn_deg_s: 60, overlap: 0.1}\n"
-        "planner: {line: quick, name: colony-search, ants: 50, seed: 9, tau0: 0.2}\n"
+        "planner: {line: quick, name: colony-search, ants: 50, seed: 9, tau0: 0.2, swept: 0.9}\n"
     )
     figures, _ = plan("office", "--config", file)
     assert (figures["line"], figures["seed"], figures["budget_s"]) == ("quick", 9, 0.05)
@@ -273,7 +273,7 @@ def test_a_plan_is_for_the_robot_of_a_configuration(plan, tmp_path):
     changed, _ = plan("office", "--config", file, "--turn-s", 2, "--cell", 0.3, "--seed", 0)
     assert (changed["turn_s"], changed["turn_deg_s"], changed["tool_m"]) == (2.0, None, 0.3)
     assert changed["seed"] == 0
-    # The paper's lattice, as the daemon with `planner.line: cells` counts.
+    # The paper's lattice, as the daemon with `planner.line: cells` counts; its line has no share.
     cells, _ = plan("office", "--config", file, "--line", "cells")
     assert (cells["cell_m"], cells["turn_deg_s"]) == (0.36, 60.0)
 

@@ -16,6 +16,8 @@ from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.line import LINES
 from tests.mission.offset_base import small_flat
 from tests.mission.test_line import CONFIG, Robot
+from tests.mission.test_room_orders import BOTH, LOOKS, PERIOD_S
+from tests.mission.world import building, with_policy
 
 RETURNS = re.compile(r"returns for (0\.\d\d) of 4\.7 m2: (\d\d\.\d) % swept, takes \d+ s")
 
@@ -91,6 +93,44 @@ def test_it_returns_before_the_way_home_not_from_there():
     assert np.hypot(*np.subtract(robot.at, (0.6, 0.6))) < CONFIG.footprint.cell_m
 
 
+def test_an_order_out_of_time_keeps_its_covered_cells():
+    ends = []
+    for share in (None, 0.99):
+        start = CommandReceived(1, "start", read_order({"until_min": 0.8}))
+        robot, _ = swept_flat(share, start)
+        assert "time is up" in robot.mission.reason
+        ends.append(robot.mission.coverage().covered)
+    # Its line sweeps more in passing, so it comes less far.
+    assert ends[1] > 0.8 * ends[0] > 0
+
+
+def test_the_same_order_given_again_begins_anew():
+    start = CommandReceived(1, "start", read_order({}))
+    robot, _ = swept_flat(1.0, start)
+    share = robot.mission.line.left.share
+    raised, least_m2 = share._raised, share._least_m2
+    assert raised > RAISED
+    assert least_m2 > 4.0
+    robot.tell(replace(start, number=2))
+    robot.drive()
+    assert (share._raised, share._least_m2) == (RAISED, 0.0)
+
+
+def test_rooms_in_turn_are_all_covered_before_it_returns():
+    line = replace(LINES["quick"], swept=0.99)
+    sweeping = replace(CONFIG.sweeping, line=line)
+    robot = Robot(Mission(with_policy(replace(CONFIG, sweeping=sweeping), by_room="always")))
+    robot.at = 1.3, 1.3
+    robot.tell(MapReceived(building(*BOTH)))
+    for _ in range(LOOKS):
+        robot.now += 1.01 * PERIOD_S
+        robot.tell()
+    robot.finish()
+    reasons = [reason.partition(" for ")[0] for reason in robot.reasons]
+    assert reasons.index("floor planned first is done: the rest") < reasons.index("returns")
+    assert "99.00 % asked for: 99." in robot.mission.reason
+
+
 def test_as_few_cells_are_opened_as_suffice_with_a_margin():
     share = AskedShare(0.99)
     # 0.2 m2 are missing, so cells with 0.3 m2 are opened; the last cell has too little.
@@ -111,6 +151,7 @@ def test_a_return_that_gains_little_is_the_last_one_of_a_pass():
     assert not share.returns_to(Tally(0.6 - 0.5 * LEAST_GAIN * missing_m2), *found)
     assert share.returns_to(Tally(0.6 - 1.5 * LEAST_GAIN * missing_m2), *found)
     assert not share.returns_to(Tally(0.6), *found)
+    assert not share.why
     share.begin("second pass")
     assert share.returns_to(Tally(0.6), *found)
 

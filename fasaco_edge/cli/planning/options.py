@@ -242,7 +242,8 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         type=float,
         metavar="SHARE",
         help="share of the reachable floor that the line has to sweep, in the least time; needs "
-        "more than the default --budget (default: all floor that is worth its time)",
+        "more than the default --budget (default: planner.swept of --config, else all floor that "
+        "is worth its time)",
     )
 
 

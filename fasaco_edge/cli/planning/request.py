@@ -111,11 +111,13 @@ def read_request(args: argparse.Namespace) -> RequestedPlan:
     line = args.line or default_line(search, has_floor=Path(args.map).suffix != ".npy")
     if args.line is None and config is not None and line != CELLS:
         line = config.planner.line
-    if search.swept is not None and line == CELLS:
+    if args.swept is not None and line == CELLS:
         raise BadConfiguration(
             "--swept: a line through the centres of cells has no share to choose",
             hint="ask for a line over the floor, quick or thorough",
         )
+    if line == CELLS:
+        search = replace(search, swept=None)
     robot = config.robot if config else RobotConfig()
     if config is None and line == CELLS:
         robot = msgspec.structs.replace(robot, quarter_turn_s=0.0)  # as in the paper

@@ -71,6 +71,7 @@ class AskedShare:
             pixels: int64 (n,), number of missed pixels that each of them leads to.
         """
         assert self.share is not None
+        self.why = ""
         missing_m2 = tally.left_m2 - (1.0 - self.share) * tally.wanted_m2
         swept_m2 = tally.wanted_m2 - tally.left_m2
         if missing_m2 <= 0.0 or swept_m2 < self._least_m2:

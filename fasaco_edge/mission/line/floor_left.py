@@ -238,6 +238,13 @@ class UnsweptTally:
         ``at``: int32 (n, 2), a cell for each missed pixel.
         """
         assert self._tally is not None
+        state = self._orders.order_state
+        if state.late or state.stage is Stage.RETURNING:
+            # The order ends with this path: cells reopened now would count as not covered.
+            return False
+        if self._orders.scope.is_first_done:
+            # The rest of the pass is covered before.
+            return False
         self._begin_part()
         found, pixels = np.unique(at, axis=0, return_counts=True)
         may_open = [self._ledger.may_open_again((row, col)) for row, col in found.tolist()]
@@ -248,8 +255,10 @@ class UnsweptTally:
 
     def _begin_part(self) -> None:
         state = self._orders.order_state
-        # A reset or another building makes another object of the swept floor.
-        self.share.begin((self._ledger.floor, state.order, state.zone, state.pass_number))
+        # A reset or another building makes another object of the swept floor; an order that is
+        # given again forgets floor.
+        swept = self._ledger.floor
+        self.share.begin((swept, swept.forgotten, state.order, state.zone, state.pass_number))
 
     @property
     def price_factor(self) -> float:
