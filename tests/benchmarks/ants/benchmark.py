@@ -53,13 +53,14 @@ PAIRS = ((LIVING, NONE), (NEW, NONE), (FLAT, NONE), (LIVING, NEW), (LIVING, FLAT
 
 
 class Ratio(NamedTuple):
-    """A ratio of two sums, and its standard error, clustered by building."""
+    """A ratio of two sums, and its standard error, clustered by building; NaN for one building."""
 
     value: float
     error: float
 
     def __str__(self) -> str:
-        return f"{self.value:.4f} ± {self.error:.4f}"
+        error = "" if math.isnan(self.error) else f" ± {self.error:.4f}"
+        return f"{self.value:.4f}{error}"
 
 
 def ratio(parts: Sequence[tuple[str, float, float]]) -> Ratio | None:
@@ -72,7 +73,9 @@ def ratio(parts: Sequence[tuple[str, float, float]]) -> Ratio | None:
     for place, over, under in parts:
         residuals[place] = residuals.get(place, 0.0) + over - value * under
     count = len(residuals)
-    spread = sum(one**2 for one in residuals.values()) * count / max(count - 1, 1)
+    if count < 2:
+        return Ratio(value, math.nan)
+    spread = sum(one**2 for one in residuals.values()) * count / (count - 1)
     return Ratio(value, math.sqrt(spread) / below)
 
 
