@@ -156,7 +156,6 @@ class MissionConfig:
             none.
         sweeping: how floor is swept; None to drive through the centres of cells.
         trail: rules of the living trail.
-        plans_on_trail: whether ants start from the living trail, not from a uniform one.
         battery: when to charge; None for never.
         speed_m_s: speed of the robot; 0 if not known [m/s].
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
@@ -172,7 +171,6 @@ class MissionConfig:
     spare_share: float = 0.0
     sweeping: Sweeping | None = None
     trail: TrailRules = PAPERS_RULES
-    plans_on_trail: bool = True
     battery: BatteryPolicy | None = None
     lattice_deg: float | None = 0.0
     given: MissionPolicy | None = None

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
-from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.living_trail import branching
-from fasaco_edge.planners.paper.colony import ColonyConfig
-from fasaco_edge.planners.registry import planner_of
 from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, started
 
 ROOMS = (
@@ -155,8 +150,6 @@ def test_a_loop_closure_takes_it_along(together):
 
 def test_a_plan_starts_from_the_trail():
     first = MapReceived(building(*ROOMS)), pose_at(0, 0)
-    flat = Drive((0, 0), *first, config=replace(CONFIG, plans_on_trail=False))
-    assert flat.request.problem.trail is None
     drive = Drive((0, 0), *first)
     np.testing.assert_array_equal(drive.request.problem.trail.tau, tau_of(drive))
     drive.plan()
@@ -164,11 +157,6 @@ def test_a_plan_starts_from_the_trail():
     assert seen is None
     drive.go(patch("#", at=(5, 9)))
     assert (drive.request.problem.trail.tau > 0.11).any()
-
-
-@pytest.mark.parametrize("name", ["colony-search", "fasaco"])
-def test_the_daemons_planners_with_ants_plan_on_the_trail(name):
-    assert mission_config(DaemonConfig(), planner_of(name, ColonyConfig())).plans_on_trail
 
 
 def test_missions_on_the_living_trail_are_reproducible():

@@ -40,8 +40,6 @@ class TrailLayer:
 
     def with_trail(self, request: PlanRequest) -> PlanRequest:
         """Return a request with the trail from which its ants start."""
-        if not self._config.plans_on_trail:
-            return request
         return replace(request, problem=replace(request.problem, trail=self.snapshot()))
 
     def receive_plan(self, plan: CoveragePath) -> None:

@@ -187,9 +187,7 @@ def _recorded(place: Building, seed: int, *, with_turns: bool) -> list[Moment]:
     """Return the moments of a mission."""
     recorder = _Recorder(place.name, seed)
     cost = PACE.cost(place.footprint.cell_m, with_turns=with_turns)
-    conditions = Conditions(
-        RANGE_M, PACE, cost, recorder, plans_on_trail=True, spare_share=SPARE_SHARE
-    )
+    conditions = Conditions(RANGE_M, PACE, cost, recorder, spare_share=SPARE_SHARE)
     OnlineMission(place.started_at(seed), conditions).run()
     return recorder.moments
 

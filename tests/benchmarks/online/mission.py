@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -170,7 +170,10 @@ class CountedPlanning:
         """Return a plan and how long it took."""
         limit = WorkLimit(SearchWork(proposals=self.proposals))
         stopwatch = Stopwatch()
-        path = CONTENDERS[self.planner].make(self.seed).plan(problem, limit, ignore)
+        contender = CONTENDERS[self.planner]
+        if not contender.on_trail:
+            problem = replace(problem, trail=None)
+        path = contender.make(self.seed).plan(problem, limit, ignore)
         return path, stopwatch.read()
 
 
@@ -199,14 +202,13 @@ class Conditions:
         pace: how fast it is.
         cost: what its walks are to have little of.
         seat: who plans.
-        plans_on_trail, policy, battery, spare_share: see ``MissionConfig``.
+        policy, battery, spare_share: see ``MissionConfig``.
     """
 
     range_m: float
     pace: Pace
     cost: CoverageCost
     seat: PlannerSeat
-    plans_on_trail: bool = False
     policy: MissionPolicy = NO_PATIENCE
     battery: BatteryPolicy | None = None
     spare_share: float = 0.0
@@ -237,7 +239,6 @@ class OnlineMission:
             building.footprint,
             cost=conditions.cost,
             policy=conditions.policy,
-            plans_on_trail=conditions.plans_on_trail,
             battery=conditions.battery,
             spare_share=conditions.spare_share,
         )

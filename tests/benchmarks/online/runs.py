@@ -16,7 +16,7 @@ from fasaco_edge.planners.grids import MAP_FOOTPRINT, NamedGrid
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.harness import judged as judged_plan
 from tests.benchmarks.online.buildings import Building, BuildingChoice, of_grid
-from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
+from tests.benchmarks.online.contenders import DAEMON
 from tests.benchmarks.online.judge import MissionRun, Reference, judged
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission, near_optimal
 from tests.benchmarks.online.robot import Pace
@@ -114,7 +114,6 @@ def _run(
         pace=plan.pace,
         cost=plan.pace.cost(building.footprint.cell_m, with_turns=plan.with_turns),
         seat=CountedPlanning(seed, plan.proposals, planner),
-        plans_on_trail=CONTENDERS[planner].on_trail,
     )
     mission = OnlineMission(building, conditions)
     mission.run()
