@@ -134,7 +134,9 @@ class _Reader:
         if before >= MOST_FAULTS:
             return UNSET
         where, expected, misfit = _misfit(message, value)
-        if isinstance(value, dict) and (struct := _struct(kind)):
+        if _is_bare_item(kind, value):
+            where, expected, misfit = "", "expected a list: write [ ] around it", value
+        elif isinstance(value, dict) and (struct := _struct(kind)):
             read = self._members(struct, value, key)
         elif (
             (where or message == "Invalid text")
@@ -144,7 +146,7 @@ class _Reader:
             read = self._items(of, value, key)
         # If no part has a fault, the value has one itself. Unknown keys may be of other programs.
         if len(self.faults) == before and not expected.startswith("object contains unknown"):
-            expected = _expected(kind, expected)
+            expected = _expected(kind, expected) if where else _shaped(kind, expected)
             if isinstance(misfit, str) and re.fullmatch(r"-?\d+,\d+", misfit):
                 expected += " with a decimal point"
             # Null, true and false are shown as YAML and JSON write them.
@@ -155,8 +157,10 @@ class _Reader:
 
     def _members(self, kind: type[msgspec.Struct], value: dict[Any, object], key: str) -> _Value:
         fields = {field.encode_name: field for field in structs.fields(kind)}
-        if any(not isinstance(name, str) for name in value):
-            self._add(key, f"expected a text as key, got {shown(value)}")
+        for name in (each for each in value if not isinstance(each, str)):
+            # "{radius_m: 0,2}" has the keys radius_m and 2.
+            comma = "; a number has a decimal point, no comma" if value[name] is None else ""
+            self._add(key, f"expected a text as key, got {shown(name)}{comma}")
         is_open = getattr(kind, "is_open", False)
         misspelt: set[str] = set()
         for name in (each for each in value if isinstance(each, str) and each not in fields):
@@ -240,6 +244,27 @@ def _expected(kind: _Kind, expected: str) -> str:
         return "expected " + " or ".join(filter(None, (", ".join(words[:-1]), words[-1])))
     # YAML 1.1 reads 8:1 as a number.
     return _in_words(expected) + (", in quotes" if expected == "expected str" else "")
+
+
+def _is_bare_item(kind: _Kind, value: object) -> bool:
+    """Return whether a value is an item of the list that was expected."""
+    if not value or _of_items(kind) is None:
+        return False
+    try:
+        msgspec.convert([value], kind)
+    except (msgspec.ValidationError, UnicodeEncodeError):
+        return False
+    return True
+
+
+def _shaped(kind: _Kind, expected: str) -> str:
+    """Return what a type expects, and the required keys of a mapping."""
+    words, struct = _expected(kind, expected), _struct(kind)
+    required = (
+        [each.encode_name for each in structs.fields(struct) if each.required] if struct else []
+    )
+    shape = ", ".join(f"{name}: ..." for name in required)
+    return words.replace("a mapping", f"a mapping such as {{{shape}}}") if shape else words
 
 
 def _in_words(expected: str) -> str:

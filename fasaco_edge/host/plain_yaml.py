@@ -58,7 +58,7 @@ def read_bounded(path: Path) -> str:
     try:
         return content.decode()
     except UnicodeDecodeError as error:
-        raise PlainYamlError(str(error)) from error
+        raise PlainYamlError(f"byte {error.start + 1} is not text in UTF-8") from error
 
 
 _Error = TypeVar("_Error", bound=DocumentError)
@@ -137,7 +137,8 @@ def read_written(
     twice = []
     for key, line in keys:
         if key in lines:
-            text = f"is given twice, in line {lines[key]} and in line {line}"
+            both = f", in line {lines[key]} and" if lines[key] != line else ""
+            text = f"is given twice{both} in line {line}"
             twice.append(error(text, key=key))
         lines[key] = line
     return Written(path, values, lines, tuple(twice))

@@ -228,3 +228,10 @@ def test_the_keep_out_mask_is_read_as_the_daemon_reads_it(check, tmp_path):
     assert checks == [(78, [(3, "mission.keep_out_mask")])] * 3 + [(0, [])]
     code, told = check(text, "--show")
     assert told["config"]["mission"]["keep_out_mask"] == "mask.yaml"
+
+
+def test_a_file_that_is_no_text_is_named(tmp_path):
+    (tmp_path / "robot.yaml").write_bytes(b"a: \xff")
+    ended = fasaco_edge("check-config", tmp_path / "robot.yaml")
+    assert ended.code == 78
+    assert "not plain YAML: byte 4 is not text in UTF-8" in ended.out + ended.err

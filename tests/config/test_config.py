@@ -123,6 +123,11 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ),
         ("robot: {overlap: 0.9}", "robot.overlap: expected a number of at most 0.5, got 0.9"),
         ("robot: 3", "robot: expected a mapping, got 3"),
+        ("mission: {home: 3}", "expected a mapping such as {x_m: ..., y_m: ...} or null, got 3"),
+        (
+            "mission: {keep_out: [[1, 1], [2, 1], [2, 2]]}",
+            "mission.keep_out: expected a list: write [ ] around it, got [[1, 1], [2, 1], [2, 2]]",
+        ),
         ("robot: {name: 3}", "robot.name: expected a text, in quotes, got 3"),
         (
             "robot: {name: a/b}",
@@ -130,7 +135,10 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ),
         ("robot: {name: ''}", "got ''"),
         (r'bus: {mode: "\ud800"}', "bus.mode: expected peer, client or router, got"),
-        ("bus: {listen: 'tcp/0.0.0.0:1'}", "bus.listen: expected a list, got 'tcp/0.0.0.0:1'"),
+        (
+            "bus: {listen: 'tcp/0.0.0.0:1'}",
+            "bus.listen: expected a list: write [ ] around it, got 'tcp/0.0.0.0:1'",
+        ),
         ("bus: {listen: [7447]}", "bus.listen[0]: expected a text, in quotes, got 7447"),
         ("bus: {listen: []}", "bus.listen: must not be empty if bus.connect is empty"),
         (
@@ -200,8 +208,10 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ),
         ("mission: {keep_out_mask: 'mask:{}'}", "mission.keep_out_mask: not a mask"),
         ("[1, 2]", "expected a mapping, got [1, 2]"),
-        ("robot: {1: 2}", "robot: expected a text as key, got {1: 2}"),
-        ("1: 2", "expected a text as key, got {1: 2}"),
+        ("robot: {1: 2}", "robot: expected a text as key, got 1"),
+        ("robot: {radius_m: 1, radius_m: 2}", "robot.radius_m: is given twice in line 1"),
+        ("robot: {radius_m: 0,2}", "got 2; a number has a decimal point, no comma"),
+        ("1: 2", "expected a text as key, got 1"),
         (
             "robot:\n  name: [unclosed\nbus: 1",
             "not plain YAML: line 3, column 4: expected ',' or ']', but got ':', while parsing a "
@@ -377,7 +387,7 @@ def test_ros_is_left_out_unless_it_stands_there(load):
 @pytest.mark.parametrize(
     ("block", "text"),
     [
-        ("", "ros2: expected a mapping, got null"),
+        ("", "ros2: expected a mapping such as {kind: ...}, got null"),
         ("{}", "ros2.kind: missing"),
         ("{kind: dds}", "ros2.kind: expected bridge or rmw_zenoh, got 'dds'"),
         ("{kind: bridge, domain: 3}", "domain and node are for kind rmw_zenoh"),

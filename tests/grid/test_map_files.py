@@ -230,7 +230,7 @@ def test_missing_keys_are_named(tmp_path, key):
     [
         ("resolutoin: 0.05", "resolutoin: unknown key; did you mean resolution?"),
         ("", "image: missing"),
-        ("- a", "expected a mapping, got ['a']"),
+        ("- a", "expected a mapping such as {image: ..."),
     ],
 )
 def test_an_incomplete_map_file_error_lists_its_keys(tmp_path, text, said):
