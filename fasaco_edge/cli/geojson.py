@@ -22,7 +22,10 @@ from fasaco_edge.mission.orders.order import MissionOrder, OrderDocument, order_
 from fasaco_edge.wire.documents.rooms import Rooms
 
 SUFFIX = ".geojson"
-HINT = "draw each zone as a Polygon; `rooms list --geojson` shows what one looks like"
+HINT = (
+    "draw each zone as a Polygon, in metres in the frame of the map; `rooms list --geojson` shows "
+    "what one looks like"
+)
 Members = dict[str, object]
 
 

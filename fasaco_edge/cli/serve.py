@@ -158,6 +158,7 @@ def _serve(server: Server, args: argparse.Namespace, address: Address, guard: Gu
     except OSError as error:
         why = f"--listen: cannot listen at {address.shown}: {error.strerror or error}"
         print(one_line(f"fasaco-edge: {why}"), file=sys.stderr)
+        print("  hint: give --listen another port, or an address of this computer", file=sys.stderr)
         return Exit.ERROR
     return Exit.OK
 

@@ -99,6 +99,12 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([args.trail_out], map_sources(path))
     here = robot_on_bus(args)
     robot = RobotConfig() if here.config is None else here.config.robot
+    if not 1.0 <= args.map_hz <= 5.0:
+        raise BadConfiguration(f"--map-hz must be 1 to 5, got {args.map_hz:g}")
+    if not args.range > 0.0:
+        raise BadConfiguration(f"--range must be above 0 m, got {args.range:g}")
+    if args.speed is not None and not args.speed > 0.0:
+        raise BadConfiguration(f"--speed must be above 0, got {args.speed:g}")
     config = SimulationConfig(
         robot_radius_m=robot.radius_m if args.robot_radius is None else args.robot_radius,
         speed_m_s=robot.speed_m_s,

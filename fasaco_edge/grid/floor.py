@@ -297,7 +297,9 @@ def _nearest_place(
 ) -> tuple[int, int]:
     col, row = geometry.to_pixels(*start)
     if not (0 <= row < geometry.rows and 0 <= col < geometry.cols):
-        raise StartOutsideMap(f"the start ({start[0]:g}, {start[1]:g}) m is outside the map")
+        raise StartOutsideMap(
+            f"the start ({start[0]:g}, {start[1]:g}) m is outside the map, {geometry.extent}"
+        )
     found = np.argwhere(places)
     squares = ((found + 0.5 - np.array((row, col))) ** 2).sum(axis=1)
     if not len(found) or squares.min() > max(reach, 1.0) ** 2 + 1:

@@ -212,6 +212,13 @@ class GridGeometry:
         """The window of all pixels."""
         return Window(0, 0, self.rows, self.cols)
 
+    @property
+    def extent(self) -> str:
+        """From where to where the map reaches, in words."""
+        ends = [self.to_map(col, row) for col in (0, self.cols) for row in (0, self.rows)]
+        (left, low), (right, high) = (map(of, zip(*ends, strict=True)) for of in (min, max))
+        return f"which reaches from ({left:.2f}, {low:.2f}) to ({right:.2f}, {high:.2f}) m"
+
     def to_pixels(self, x: _Coordinate, y: _Coordinate) -> tuple[_Coordinate, _Coordinate]:
         """Return the pixel coordinates (column, row), not rounded, of one or many points [m]."""
         dx, dy = x - self.origin.x, y - self.origin.y

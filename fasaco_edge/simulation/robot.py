@@ -91,7 +91,7 @@ class SimulationConfig:
             value, may_be_zero = getattr(self, field.name), field.name in MAY_BE_ZERO
             if not math.isfinite(value) or value < 0 or (value == 0 and not may_be_zero):
                 least = "at least 0" if may_be_zero else "above 0"
-                raise BadConfiguration(f"{field.name} must be {least}, got {value}")
+                raise BadConfiguration(f"{field.name} must be {least}, got {value:g}")
         if self.padding_m >= self.robot_radius_m:
             raise BadConfiguration(
                 f"padding_m must be below robot_radius_m ({self.robot_radius_m}), "

@@ -101,7 +101,10 @@ class World:
         self.frame = truth.frame
         col, row = truth.geometry.to_pixels(start.x, start.y)
         if not (0 <= row < truth.geometry.rows and 0 <= col < truth.geometry.cols):
-            raise StartOutsideMap(f"start ({start.x:g}, {start.y:g}) m is not on the map")
+            raise StartOutsideMap(
+                f"the start ({start.x:g}, {start.y:g}) m is outside the map, "
+                f"{truth.geometry.extent}"
+            )
         if not _fits(truth, start, config):
             raise StartBlocked(
                 f"a robot of radius {config.robot_radius_m:g} m does not fit at the start "

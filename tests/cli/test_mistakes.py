@@ -101,8 +101,14 @@ def folder(tmp_path, monkeypatch):
             "good.npy is a coverage grid (.npy), which lies in no",
         ),
         (f"simulate nowhere --connect {NOBODY}", 1, "no map 'nowhere'"),
-        (f"simulate office --speed 0 --connect {NOBODY}", 78, "speed must be above 0, got 0.0"),
-        (f"simulate office --start-xy 999,9 --connect {NOBODY}", 1, "(999, 9) m is not on the map"),
+        (f"simulate office --speed 0 --connect {NOBODY}", 78, "--speed must be above 0, got 0"),
+        ("simulate office --map-hz 50", 78, "--map-hz must be 1 to 5, got 50"),
+        ("simulate office --range 0", 78, "--range must be above 0 m, got 0"),
+        (
+            f"simulate office --start-xy 999,9 --connect {NOBODY}",
+            1,
+            "(999, 9) m is outside the map, which reaches from",
+        ),
         (f"simulate office --robot a/b --connect {NOBODY}", 78, "got 'a/b'"),
         ("simulate office --connect office", 78, "'office': no protocol before the address"),
         (f"record --out . --connect {NOBODY}", 1, f"cannot connect to {NOBODY}\n"),
@@ -184,9 +190,16 @@ def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said)
         ("plan office --start-xy 1,1e300", "must be within 2e+07 m of 0, got 1,1e300"),
         ("plan office --start 1,1 --start-xy 1,1", "not allowed with argument --start"),
         ("plan office --end there", "--end: must be anywhere, home or row,column, got 'there'"),
-        ("plan office --cell wide", "argument --cell/--tool-width: invalid float value: 'wide'"),
-        ("plan office --cell 0,3", "invalid float value: '0,3'; did you mean 0.3?"),
-        ("plan office --ants 1,000", "invalid int value: '1,000'\n"),
+        (
+            "plan office --cell wide",
+            "argument --cell/--tool-width: must be a number of metres, got 'wide'",
+        ),
+        ("plan office --cell 0,3", "must be a number of metres, got '0,3'; did you mean 0.3?"),
+        ("simulate flat --range 3m", "argument --range: must be a number of metres, got '3m'"),
+        ("mission start --until-min 1h", "must be a number of minutes, got '1h'"),
+        ("bench daemon --maps flat", "argument --maps: must be a whole number, got 'flat'"),
+        ("demo --robots 20", "invalid choice: 20; there are 1, 2, 3, 4, 5, 6, 7, 8"),
+        ("plan office --ants 1,000", "must be a whole number, got '1,000'\n"),
         ("ask status --timeout 2,5", "got '2,5'; did you mean 2.5?"),
         ("plan office --planner colony-serch", "'colony-serch'; did you mean colony-search?"),
         ("review a.rrd --pint 1,2", "unrecognized arguments: --pint 1,2; did you mean --point?"),
@@ -329,7 +342,7 @@ def test_a_recorder_without_a_folder_is_an_error(folder):
     with daemon_process(folder, bus={"listen": [endpoint]}), Outsider(endpoint):
         ended = fasaco_edge("record", "--out", "good.npy", "--connect", endpoint)
     assert ended.code == 78
-    assert "cannot record into good.npy" in ended.err
+    assert "cannot record into good.npy: File exists" in ended.err
 
 
 def test_a_failing_disk_is_no_configuration_error():

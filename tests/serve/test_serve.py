@@ -308,6 +308,7 @@ def test_a_taken_address_is_an_error(page):
     ended = fasaco_edge("serve", "--connect", free_endpoint(), "--listen", page.address)
     assert (ended.code, ended.out) == (1, "")
     assert "cannot listen" in ended.err
+    assert "hint: give --listen another port" in ended.err
 
 
 def test_fifty_viewers_that_come_and_go_leave_nothing(page):

@@ -14,6 +14,8 @@ from fasaco_edge.text import suggestion
 
 USAGE = 2
 """Exit code of a wrong command line."""
+UNITS = {"M": "metres", "S": "seconds", "MIN": "minutes", "MB": "megabytes", "HZ": "hertz"}
+"""Units of options by their metavar."""
 _AFTER_COMMAND = "options such as {} come after the command"
 
 
@@ -73,6 +75,10 @@ class Parser(argparse.ArgumentParser):
         try:
             return super()._get_value(action, arg_string)
         except argparse.ArgumentError as error:
+            if number := re.match(r"invalid (\w+) value: ", error.message):
+                kind = "a number" if number[1] == "float" else "a whole number"
+                unit = f" of {UNITS[action.metavar]}" if action.metavar in UNITS else ""
+                error.message = f"must be {kind}{unit}, got {arg_string!r}"
             if re.fullmatch(r"-?\d*,\d+", arg_string):
                 point = arg_string.replace(",", ".")
                 # No suggestion if a number with a point is wrong, too.
@@ -85,7 +91,7 @@ class Parser(argparse.ArgumentParser):
         if action.choices is None or value in action.choices:
             return
         names = [str(choice) for choice in action.choices]
-        meant = suggestion(str(value), names)
+        meant = suggestion(value, names) if isinstance(value, str) else ""
         if not meant and isinstance(action, argparse._SubParsersAction) and value in self._given:
             before = self._given[max(self._given.index(value) - 1, 0)]
             if before.startswith("-"):

@@ -33,7 +33,8 @@ LOG = logging.getLogger(__name__)
 def cannot_record(folder: Path, error: OSError) -> BadConfiguration:
     """Return the error of a folder that cannot be read, made or written to."""
     return BadConfiguration(
-        f"cannot record into {folder}: {error}", hint="name a folder that may be written to"
+        f"cannot record into {folder}: {error.strerror or error}",
+        hint="name a folder that may be written to",
     )
 
 
