@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
@@ -33,7 +32,6 @@ from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from fasaco_edge.wire.query_table import RPC_NAMES
-from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.queries import QueryReply
@@ -149,9 +147,8 @@ def show_mission(reply: QueryReply) -> None:
 def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
     mission = answer.mission
     rows = [("robot", answer.robot), ("state", answer.state)]
-    # While a robot follows its path, its reason is only the path's number.
-    if not re.fullmatch(r"path \d+", answer.reason):
-        rows.append(("reason", plain(answer.reason)))
+    if reason := phrases.reason(answer):
+        rows.append(("reason", reason))
     if mission.ordered is not None:
         began = "begun by itself" if mission.ordered == "itself" else "as ordered"
         stage = phrases.stage(mission)
@@ -163,8 +160,10 @@ def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
     if answer.floor is not None:
         rows.append(("floor swept", phrases.swept(answer.floor)))
     if mission.keep_out:
-        names = ", ".join(each.name for each in mission.keep_outs if each.by == "operator")
-        rows.append(("keep-out zones", f"{mission.keep_out}{f', with {names}' if names else ''}"))
+        names = [each.name for each in mission.keep_outs if each.by == "operator"]
+        named = f": {', '.join(names)}" if names else ""
+        more = f", {rest} more" if names and (rest := mission.keep_out - len(names)) else ""
+        rows.append(("keep-out zones", f"{mission.keep_out}{named}{more}"))
     if mission.return_home:
         home = mission.home
         rows.append(("home", f"({home.x:.2f}, {home.y:.2f}) m" if home else "not known yet"))

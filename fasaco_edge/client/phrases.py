@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections import deque
 from collections.abc import Iterator
@@ -105,6 +106,14 @@ def troubles(status: Status | Reply) -> list[tuple[str, str]]:
     ]
 
 
+def reason(status: Status | Reply) -> str:
+    """Return the state's reason; "" if it only repeats the path's number, or a trouble."""
+    if re.fullmatch(r"path \d+", status.reason):
+        return ""
+    shown = (each.text for each in status.troubles[: len(TROUBLES)])
+    return "" if status.reason in shown else one_line(plain(status.reason))
+
+
 def steady_now() -> float:
     """Return the time since the epoch [s]; monotonic while this process runs."""
     return _OFFSET_S + time.monotonic()
@@ -192,4 +201,4 @@ def trouble_changes(before: Status | None, after: Status) -> Iterator[tuple[str,
         if code not in known and text != after.reason:
             yield f"trouble: {text}", BAD
     for code in sorted(known.keys() - present.keys()):
-        yield f"trouble is over: {code}", GOOD
+        yield f"trouble is over: {known[code]}", GOOD

@@ -40,9 +40,8 @@ def figures(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphS
 
 def _rows(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet) -> list[Row]:
     state = Text(one_line(status.state), f"bold {state_colour(status.state)}")
-    # The path's number is shown with the path.
-    if status.path is None or status.reason != f"path {status.path.revision}":
-        state.append(f": {one_line(plain(status.reason))}", "not bold")
+    if reason := phrases.reason(status):
+        state.append(f": {reason}", "not bold")
     rows: list[Row] = [("state", state)]
     rows += [
         ("trouble", _text(f"{what}: {to_do}", "red")) for what, to_do in phrases.troubles(status)

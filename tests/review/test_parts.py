@@ -160,7 +160,7 @@ def test_troubles_and_faults_are_reported(parts):
     ]
     texts = [line for _, line in review.record.texts["log/mission"]]
     assert texts.index("trouble: the dock gives no current") < texts.index(
-        "trouble is over: no_current"
+        "trouble is over: the dock gives no current"
     )
     assert told["recorder_lost"] == 2
     assert told["faults_by_code"] == {"wrong_frame": 2, "late": 1}

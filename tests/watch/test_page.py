@@ -134,6 +134,15 @@ def test_it_shows_what_a_status_says(members, said):
         assert text in page, page
 
 
+def test_a_trouble_that_is_the_reason_is_shown_once():
+    view = mid_mission()
+    lost = {"code": "no_pose", "text": "no pose for 3 s", "do": "look", "since_s": 4.0}
+    tell(view, "status", status(state="degraded", reason=lost["text"], troubles=[lost]))
+    page = page_of(view, 120, 40)
+    assert "trouble   no pose for 3 s (for 4.0 s): look" in page
+    assert "state     degraded:" not in page
+
+
 @pytest.mark.parametrize(
     ("line_s", "scale", "said"),
     [(630.0, 1, "10 min"), (630.0, 20, "32 s"), (63.0, 20, "3.1 s"), (0.0, 0, ""), (63.0, 0, ""),

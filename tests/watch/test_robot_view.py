@@ -208,7 +208,7 @@ def test_a_trouble_of_a_robot_at_rest_begins_and_ends():
     for troubles in ([], [dead], [dead | {"since_s": 4.0}], []):
         tell(view, "status", status(**resting, troubles=troubles))
     assert texts(view).count("trouble: the dock gives no current") == 1
-    assert texts(view)[-1] == "trouble is over: no_current"
+    assert texts(view)[-1] == "trouble is over: the dock gives no current"
     # A degraded mission has its trouble as its reason.
     lost = {"code": "no_pose", "text": "no pose for 3 s"}
     tell(view, "status", status(state="degraded", reason=lost["text"], troubles=[lost]))
