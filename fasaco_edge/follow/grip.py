@@ -92,7 +92,8 @@ class Grip:
     @property
     def detail(self) -> str:
         """The failed tries in the present direction, in words."""
-        text = f"tried {self._tries.tries(self._toward)} times"
+        tries = self._tries.tries(self._toward)
+        text = f"tried {tries} time{'s' * (tries != 1)}"
         if (least := self._rest.least) >= 2.0 * MOVED_M:
             text += f"; poses scatter: goes on once moved by {least:.1f} m"
         return text
