@@ -22,10 +22,11 @@ It covers everything that the robot can reach, unless it gets an order (`fasaco-
 has to wait for one (mission.autostart: false). Order and coverage are kept on disk: after a restart
 the mission continues where it stopped.
 
-As a service (deploy/) it notifies systemd when it is ready, and feeds the watchdog. At SIGHUP it
-reloads its configuration: it applies settings that can change at run time (planner, map, the
-robot's speeds, the mission's timeouts and zones) and lists the others; it rejects a faulty file as
-a whole.
+As a service (deploy/) it notifies systemd when it is ready, and feeds the watchdog. Then
+`systemctl reload` (SIGHUP) reloads its configuration: it applies settings that can change at run
+time (planner, map, the robot's speeds, the mission's timeouts and zones) and lists the others; it
+rejects a faulty file as a whole. Started by hand it has no reload: SIGHUP, as from a closed
+terminal, ends it. Start it again with the new file.
 """
 
 
