@@ -71,7 +71,10 @@ def state(
             for part in plain.left(status, ordered)
         ],
         "reason": _reason(status),
-        "cells": status.coverage.fraction if status.coverage else None,
+        # After a restart the new map may not show any floor of an order that is done.
+        "cells": coverage.fraction
+        if (coverage := status.coverage) and coverage.coverable
+        else None,
         "floor": _floor(floor) if floor else None,
         "to_go_s": _to_go_s(view, status),
         "grows": view.grows(now),

@@ -294,3 +294,11 @@ def test_a_room_has_one_figure_on_the_map_and_in_the_list_of_the_order():
         tell(view, "status", {"state": "done", "mission": alone, "floor": floor}, 4.0 + (not floor))
         (zone,) = heard(view, "state", 4.0 + (not floor))["mission"]["zones"]
         assert zone["share"] == share
+
+
+@pytest.mark.parametrize(("coverable", "share"), [(8, 0.5), (0, None)])
+def test_no_share_is_shown_of_an_order_without_floor(coverable, share):
+    view = ServedView(Keys())
+    coverage = {"coverable": coverable, "covered": coverable // 2, "fraction": share or 1.0}
+    tell(view, "status", {"state": "done", "coverage": coverage}, 1.0)
+    assert heard(view, "state", 1.0)["cells"] == share
