@@ -146,16 +146,20 @@ def _held(
     # An order may be older than the recording: then only the first statuses say who gave it.
     first_s = next((at_s for at_s, command in data.commands if command.name == "start"), end_s)
     reported = (each.status.mission.ordered for each in data.statuses if each.at_s < first_s)
-    ordered, began, order = next(filter(None, reported), "itself"), 0.0, None
+    source = next(filter(None, reported), None)
+    ordered, began, order = source or "itself", 0.0, None
+    # A mission that has begun by itself is equal to an order for everything.
+    present = MissionOrder() if source == "itself" else None
     is_open = True
     for at_s, (name, given, *_) in data.commands:
-        is_the_same = name == "start" and is_open and order == given
+        is_the_same = name == "start" and is_open and present == given
         if is_the_same and _state_at(states, at_s) not in OVER:
             continue
         if name == "start" or (name in ENDS and is_open):
             if is_open:
                 yield ordered, began, at_s, name, order
             ordered, began, order, is_open = "command", at_s, given, name == "start"
+            present = order
     if is_open:
         yield ordered, began, end_s, None, order
 

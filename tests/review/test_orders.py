@@ -128,6 +128,13 @@ def test_an_equal_order_continues_unless_it_is_over():
     assert [order.at_s for order in told(*rows, commands=anew)] == [10, 60]
 
 
+def test_an_order_for_everything_continues_one_begun_by_itself():
+    own = MissionReport("itself")
+    for commands, starts in (([(50, "start", ALL)], [0]), ([(50, "start", KITCHEN)], [0, 50])):
+        orders = restarted(own, own, states=("covering", "covering"), commands=commands)
+        assert [order.at_s for order in orders] == starts
+
+
 @pytest.mark.parametrize("command", ["cancel", "reset"])
 def test_a_cancelled_order_is_over(command):
     rows = ((0, "covering", 5, 60), (20.1, "idle", 0, 60), (30.1, "covering", 0, 60))
