@@ -10,6 +10,7 @@ from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.cli.geojson import rooms_collection
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.passes import passes_document
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
@@ -144,6 +145,11 @@ def _asked(args: argparse.Namespace) -> dict[str, object]:
         case "merge":
             room |= {"others": args.others} | ({"name": args.name} if args.name else {})
         case "set":
+            if args.passes is None and args.skip is None and args.priority is None:
+                raise BadConfiguration(
+                    "nothing to set: --passes, --priority, --skip or --no-skip must be given",
+                    hint="fasaco-edge rooms set --help",
+                )
             if args.passes is not None:
                 room["passes"] = passes_document(len(args.passes), args.passes)
             if args.skip is not None:

@@ -102,6 +102,7 @@ def folder(tmp_path, monkeypatch):
         ),
         (f"simulate nowhere --connect {NOBODY}", 1, "no map 'nowhere'"),
         (f"simulate office --speed 0 --connect {NOBODY}", 78, "--speed must be above 0, got 0"),
+        ("rooms set 1", 78, "nothing to set: --passes, --priority, --skip or --no-skip"),
         ("simulate office --map-hz 50", 78, "--map-hz must be 1 to 5, got 50"),
         ("simulate office --range 0", 78, "--range must be above 0 m, got 0"),
         (

@@ -120,7 +120,7 @@ def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
         raise nobody_answers(f"{keys.base}/{VERSION}/*", ())
     raise NobodyAnswersError(
         f"no robot of a fleet {one_line(fleet)!r} answers",
-        hint=f"{len(statuses)} robots answer, of these fleets: {fleets or 'none'}; "
+        hint=f"robots that answer: {len(statuses)}, of these fleets: {fleets or 'none'}; "
         "`fleet: {name: ...}` in the configuration of a robot makes it a member",
     )
 

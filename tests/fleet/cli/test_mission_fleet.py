@@ -88,7 +88,7 @@ def test_an_unknown_fleet_is_an_error_that_lists_fleets(router, capsys):
     assert command(router, "pause", "--fleet", "garden") == 1
     error = capsys.readouterr().err
     assert "no robot of a fleet 'garden' answers" in error
-    assert "3 robots answer, of these fleets: hall, yard" in error
+    assert "robots that answer: 3, of these fleets: hall, yard" in error
 
 
 def test_an_invalid_status_does_not_block_a_fleet(router, capsys):
