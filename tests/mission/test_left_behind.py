@@ -47,7 +47,7 @@ def test_a_way_home_that_opens_leads_over_the_floor_left(retries):
     assert drive.mission.reason == "no way home: waits for a map that shows one"
     drive.tell(OPEN)
     assert ends(drive)
-    assert drive.mission.reason == "every reachable cell is covered"
+    assert drive.mission.reason.startswith("every reachable cell is covered")
     assert drive.cell == (0, 0)
 
 

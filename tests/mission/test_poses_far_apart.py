@@ -63,9 +63,8 @@ def test_a_robot_that_drives_on_unseen_is_not_led_back(seen):
     found = robot(40, 60, every_s=3.5)
     assert found.wait(1500.0, lambda robot: robot.mission.state == "done")
     assert found.mission.reason.startswith("every reachable cell is covered; ")
-    assert found.mission.reason.endswith(
-        "; poses are too far apart, and what lies between them does not count"
-    )
+    far_apart = "; poses are too far apart, and what lies between them does not count"
+    assert far_apart in found.mission.reason
     reasons = [why for _, _, why in found.paths]
     assert not [why for why in reasons if why.startswith("the pose came back")]
     assert "too far apart" not in seen.mission.reason

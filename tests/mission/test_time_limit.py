@@ -94,7 +94,7 @@ def test_the_configured_limit_applies_to_orders_without_one():
     assert drive.mission.reason.startswith("time is up after 0.5 min: ")
     drive.command("start", {"until_min": 0.0})
     drive.finish()
-    assert drive.mission.reason == "every reachable cell is covered"
+    assert drive.mission.reason.startswith("every reachable cell is covered")
 
 
 def test_new_floor_does_not_reopen_an_order_out_of_time():

@@ -38,6 +38,7 @@ class Executive:
             self._find_place,
             self._run_errand,
             self._wait_for_room,
+            self._look_around,
             self._judge_path,
             self._plan,
             self._end_order,
@@ -49,6 +50,7 @@ class Executive:
         self.route, self.charging = parts.route, parts.charging
         self.time_limit, self.giving_way, self.dock = parts.time_limit, parts.giving_way, parts.dock
         self.way_out, self.blocked = parts.way_out, parts.blocked
+        self._looking = parts.look_around
         self._standing, self._checks = parts.standing, PathChecks(parts)
         self._errands = Errands(parts)
         self._work = OrderWork(parts, self._errands)
@@ -176,7 +178,8 @@ class Executive:
         route, cell = self.route, self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()
-            return self.way_out.lead_out(self.map.why_misplaced(), self._now)
+            looks = self._looking.turn(None, self._now)
+            return looks or self.way_out.lead_out(self.map.why_misplaced(), self._now)
         self._cell = cell
         self._standing.update(cell, self._now)
         if not len(route.path.cells):
@@ -195,6 +198,15 @@ class Executive:
         """Wait for a room that the order names, once all other zones are done."""
         name = self.orders.order_state.waits_for
         return self._work.wait_for_room(name, self._now) if name else None
+
+    def _look_around(self) -> Doing | None:
+        """Turn on the spot, before the first path, if the map shows hardly any floor.
+
+        A zone that the map does not show yet is looked for otherwise.
+        """
+        zone = self.orders.order_state.current_zone
+        seeks_zone = zone is not None and zone.polygon is not None
+        return None if seeks_zone else self._looking.turn(self.map.area, self._now)
 
     def _judge_path(self) -> None:
         """Request a plan if the path no longer serves the order."""

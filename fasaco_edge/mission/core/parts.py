@@ -10,6 +10,7 @@ from fasaco_edge.mission.core.charging import BatteryGauge, Charging
 from fasaco_edge.mission.core.company_kind import ALONE, CompanyKind
 from fasaco_edge.mission.core.drive_meter import DriveMeter
 from fasaco_edge.mission.core.in_dock import InDock
+from fasaco_edge.mission.core.look_around import LookAround
 from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.standing import BlockedFollower, Standing
 from fasaco_edge.mission.core.time_limit import TimeLimit
@@ -59,6 +60,7 @@ class MissionParts:
         charging: when to charge; ``dock``: whether the robot is in its dock.
         time_limit: when the order has to end.
         way_out: the way back for a robot that the map has shut in.
+        look_around: turns a robot that sees hardly anything.
         blocked: the follower's report of what blocks the robot.
         standing: how long the robot has not moved.
         changes: orders and commands that change all of these.
@@ -80,6 +82,7 @@ class MissionParts:
     dock: InDock
     time_limit: TimeLimit
     way_out: WayOut
+    look_around: LookAround
     blocked: BlockedFollower
     standing: Standing
     changes: OrderChanges
@@ -127,6 +130,7 @@ def laid_parts(
         dock=InDock(map_state, lasting.battery),
         time_limit=TimeLimit(config, map_state, orders),
         way_out=WayOut(map_state, orders, route),
+        look_around=LookAround(config, map_state, route),
         blocked=BlockedFollower(),
         standing=Standing(map_state, route),
         changes=OrderChanges(

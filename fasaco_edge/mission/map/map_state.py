@@ -297,6 +297,15 @@ class MapState:
             self.ground.free.states[place] == COVERABLE != self.ground.lattice.states[place]
         )
 
+    @property
+    def is_on_unknown(self) -> bool:
+        """Whether the robot is in a cell that the map shows in part, or not at all."""
+        lattice, free = self.ground.lattice, self.ground.free
+        if lattice is None or free is None or self.pose is None:
+            return False
+        cell = lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
+        return lattice.contains(cell) and bool(free.states[lattice.local(cell)] == UNKNOWN)
+
     def why_misplaced(self) -> str:
         """Return why the robot's position is unusable, and which input it waits for."""
         assert self.ground.free is not None
@@ -306,10 +315,9 @@ class MapState:
         waits = "waits for a map or a pose that puts it on free ground"
         if not self.ground.lattice.contains(cell):
             return f"robot is outside of the map: {waits}"
-        place = self.ground.lattice.local(cell)
         if self.is_kept_out:
             return "robot is in a keep-out zone: waits to be driven out of it, or for another order"
-        if self.ground.free.states[place] == UNKNOWN:
+        if self.is_on_unknown:
             return f"robot is on unknown ground: {waits}"
         return f"robot is in an occupied cell, or too close to one: {waits}"
 

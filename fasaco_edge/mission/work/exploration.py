@@ -14,6 +14,8 @@ from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
 
+# A shorter edge of the map is not worth reporting [m].
+LEAST_EDGE_M = 1.0
 # Distance from a visited viewpoint within which the robot tries no other viewpoint [cells].
 SEEN_AROUND = 1
 # Period between searches for a way past robots that block it [s].
@@ -26,6 +28,14 @@ def frontier(area: ReachableArea) -> NDArray[np.bool_]:
     """Return the reachable cells that have an unknown neighbour, bool (rows, cols)."""
     # Everything outside the lattice is unknown.
     return area.reachable & beside(area.lattice.states == UNKNOWN, beyond=True)
+
+
+def open_edge(area: ReachableArea) -> str:
+    """Return that the reachable floor ends at the map's edge, as the end of a sentence, or ""."""
+    edge_m = float(np.count_nonzero(frontier(area))) * area.lattice.cell_m
+    if edge_m < LEAST_EDGE_M:
+        return ""
+    return f"; the map ends without a wall along {edge_m:.0f} m: there may be more floor beyond"
 
 
 def next_frontier(area: ReachableArea, polygon: Polygon, looked: Iterable[Cell]) -> Cell | None:

@@ -21,6 +21,7 @@ from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.mission.rooms.room_book import MOST_LISTED
 from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.mission.work.cells_left import LeftBehind, zones_beyond
+from fasaco_edge.mission.work.exploration import open_edge
 from fasaco_edge.mission.work.order_reach import CellsOn
 from fasaco_edge.mission.work.order_state import AT_HOME, OrderState, Stage
 from fasaco_edge.mission.work.present_order import PresentOrder
@@ -257,6 +258,9 @@ class Sequencer:
         area, free = self._map.area, self._map.ground.free
         if order is not None and area is not None and free is not None:
             self.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))
+        is_whole = order is not None and not any(zone.polygon for zone in order.zones)
+        if is_whole and area is not None and not late:
+            self.ending += open_edge(area)
         if order is not None and (rooms := left_out(order.zones)):
             self.ending += f"; left out: {', '.join(map(repr, rooms)):.{MOST_LISTED}}"
         self._order.state = replace(state, why=self.ending)
