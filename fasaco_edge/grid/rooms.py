@@ -1,10 +1,11 @@
-"""Rooms of an occupancy grid: regions of free floor that doors and mouths of passages separate.
+"""Rooms of an occupancy grid: regions of free floor that doors, openings and mouths separate.
 
 Free-standing furniture is ignored. Doors are narrow gaps between the ends of walls, and a mouth is
-the end of a narrow passage (``kernels.rooms.doors``). Each door and mouth is cut, and each
-connected part is then a region. A region too small for a room is joined to a neighbour through its
-least certain door or mouth. On an incomplete map, a room is found once enough of its floor has been
-seen; less floor, seen through a door, belongs to no room yet.
+the end of a passage or corridor (``kernels.rooms.doors``). An opening is a wide gap in a longer
+wall (``kernels.rooms.openings``). Each of them is cut, and each connected part is then a region. A
+region too small for a room is joined to a neighbour through its least certain door or mouth. On an
+incomplete map, a room is found once enough of its floor has been seen; less floor, seen through a
+door, belongs to no room yet.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from fasaco_edge.grid.lattice import beside
 from fasaco_edge.grid.occupancy import OccupancyGrid, highest
 from fasaco_edge.grid.walls import THRESHOLDS
 from fasaco_edge.kernels.lattice.areas import find_areas
+from fasaco_edge.kernels.rooms.chords import RoomPixels
 from fasaco_edge.kernels.rooms.clearance import clearances
-from fasaco_edge.kernels.rooms.doors import LEAST_SURE, DoorLimits, RoomPixels, find_doors
+from fasaco_edge.kernels.rooms.doors import LEAST_SURE, DoorLimits, find_doors
 from fasaco_edge.kernels.rooms.islands import FurnitureLimits, furniture
 from fasaco_edge.kernels.rooms.regions import beside_cuts, draw_cuts, grow
 
@@ -30,6 +32,8 @@ from fasaco_edge.kernels.rooms.regions import beside_cuts, draw_cuts, grow
 PIXEL_M = 0.05
 # Widest door; thickest wall with a door; distance beside a door in which floor has to widen [m].
 DOOR_M, WALL_M, BESIDE_M = 1.3, 0.45, 0.5
+# Widest opening in a wall, and widest corridor [m].
+OPENING_M = 4.0
 # Shortest passage whose mouth separates it from a room [m].
 PASSAGE_M = 0.8
 # Smallest room with a door, and smallest one with mouths of passages alone [m2].
@@ -46,8 +50,8 @@ OPEN_RATIO = 4.0
 # Largest ratio of unknown to wall pixels beside free pixels. Above it the map does not mark walls,
 # and all pixels that are not free count as wall.
 MOST_UNMARKED = 4
-# Largest clearance in a door [m].
-CLEAR_M = 2.0
+# Largest clearance that matters: before the mouth of a corridor [m].
+CLEAR_M = 4.0
 # Directions in which doors are searched for: to the integer points on half of a square's border, so
 # that the unit vectors are equal on all machines.
 _HALF = 6
@@ -124,7 +128,7 @@ def _solid_and_doors(
     solid, unseen = ~free & ~things, _unseen(kinds, pixel_m)
     walls = (kinds == _WALL) & ~things
     reach, passage = round(BESIDE_M / pixel_m), round(PASSAGE_M / pixel_m)
-    limits = DoorLimits(DOOR_M / pixel_m, WALL_M / pixel_m, reach, passage)
+    limits = DoorLimits(DOOR_M / pixel_m, OPENING_M / pixel_m, WALL_M / pixel_m, reach, passage)
     near = round(CLEAR_M / pixel_m)
     clearance = clearances(solid, near)
     doors = find_doors(RoomPixels(clearance, solid, walls, unseen), ~solid, _DIRECTIONS, limits)

@@ -53,6 +53,17 @@ def plan(tmp_path, capsys):
     return run
 
 
+def test_a_room_that_the_robot_cannot_reach_is_not_listed(plan, tmp_path):
+    cells = np.full((60, 150), 100, np.int8)
+    cells[2:58, 2:70] = cells[2:58, 75:148] = 0
+    write_map(
+        OccupancyGrid(GridGeometry(60, 150, 0.05, Pose2D(0.0, 0.0)), cells), tmp_path / "two.yaml"
+    )
+    figures, _ = plan(tmp_path / "two.yaml", "--rooms", "--start-xy", "1.0,1.0")
+    assert [room["room"] for room in figures["rooms"]] == [1]
+    assert figures["rooms"][0]["area_m2"] == pytest.approx(2.8 * 3.4, abs=0.2)
+
+
 def test_rooms_are_those_of_the_map(plan, capsys, tmp_path):
     """The hall of the flat, and five rooms around it."""
     picture = tmp_path / "rooms.png"

@@ -88,8 +88,39 @@ def test_crossing_passages_are_one_room():
     assert find_rooms(grid_of(cells)).count == 1
 
 
-def test_a_wide_opening_does_not():
-    assert find_rooms(grid_of(two_rooms(1.6))).count == 1
+@pytest.mark.parametrize(("opening_m", "rooms"), [(1.4, 2), (2.0, 1)])
+def test_an_opening_separates_if_its_wall_is_longer(opening_m, rooms):
+    """The wall between the rooms is 3 m long, the opening included."""
+    found = find_rooms(grid_of(two_rooms(opening_m)))
+    assert found.count == rooms
+    assert len(set(numbers(found, LEFT, RIGHT))) == rooms
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_wide_opening_in_a_longer_wall_separates(turned):
+    cells = np.full((180, 200), WALL, np.int8)
+    cells[4:176, 4:99] = cells[4:176, 101:196] = FREE
+    cells[60:125, 99:101] = FREE
+    assert find_rooms(grid_of(cells.T.copy() if turned else cells)).count == 2
+
+
+@pytest.mark.parametrize("wide_m", [1.6, 2.4])
+def test_the_mouth_of_a_corridor_separates_it_from_a_hall(wide_m):
+    wide = round(wide_m / 0.05)
+    cells = np.full((200, 360), WALL, np.int8)
+    cells[4:196, 4:160] = FREE
+    cells[100 - wide // 2 : 100 + wide // 2, 160:356] = FREE
+    found = find_rooms(grid_of(cells))
+    assert found.count == 2
+    assert numbers(found, (4.0, 5.0), (12.0, 5.0)) == [1, 2]
+
+
+def test_a_short_arm_is_part_of_its_room():
+    """As of a room in the shape of an L."""
+    cells = np.full((200, 360), WALL, np.int8)
+    cells[4:196, 4:160] = FREE
+    cells[4:60, 160:240] = FREE
+    assert find_rooms(grid_of(cells)).count == 1
 
 
 def test_furniture_does_not_separate():

@@ -146,7 +146,7 @@ def _table(under: RoomsUnderLine) -> Table:
     for name in ("room", "floor", "swept", "entered"):
         table.add_column(name, justify="right", style="cyan" if name == "room" else "")
     for room in under.rooms:
-        swept = "-" if room.swept_share is None else percent(room.swept_share)
+        swept = percent(room.swept_share)
         often = {0: "never", 1: "once"}.get(room.entered, f"{room.entered} times")
         table.add_row(str(room.room), f"{room.area_m2:,.1f} m2", swept, often)
     return table

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
+from fasaco_edge.kernels.rooms.chords import WIDER, Place, RoomPixels, holds, is_mouth, way, widest
+from fasaco_edge.kernels.rooms.openings import is_wide, may_be_wide
 
 # Kinds of jambs, from worst to best: no wall; a thick wall or a corner; a wall that is thin as far
 # as it has been seen; a thin wall.
@@ -30,31 +32,11 @@ ASLANT = 1.2
 LEAST_SURE = THIN + THICK
 # How far a chord's middle may be from the middle of the gap [pixels].
 OFF_CENTRE = 2.0
-# Squared clearance, relative to that in the mouth of a passage: inside the passage it is at most
-# EVEN; before it, not farther away than the passage is wide, it reaches at least MOUTH. Where
-# two passages cross, it is 2.
-EVEN, MOUTH = 1.3, 4.0
-# Squared clearance beside a door relative to that in the door: least ratio on the wider side, on
-# the other side, and on the other side if that is half seen.
-WIDER, OTHER, OTHER_HALF_SEEN = 1.32, 1.1, 0.8
+# Squared clearance beside a door relative to that in the door: least ratio on the other side than
+# the wider one, and there if that side is half seen.
+OTHER, OTHER_HALF_SEEN = 1.1, 0.8
 # Limit on the chords that are kept; a gap gives several, and one of them is enough.
 MOST_GAPS = 20_000
-
-
-class RoomPixels(NamedTuple):
-    """What the pixels of a map are, each (rows, cols).
-
-    Attributes:
-        clearance: int32, squared distance to the nearest solid pixel [pixels^2].
-        solid: bool, not free, furniture excepted.
-        occupied: bool, walls that have been seen.
-        unseen: bool, large unknown areas, such as a room that has not been seen yet.
-    """
-
-    clearance: NDArray[np.int32]
-    solid: NDArray[np.bool_]
-    occupied: NDArray[np.bool_]
-    unseen: NDArray[np.bool_]
 
 
 class DoorLimits(NamedTuple):
@@ -62,29 +44,17 @@ class DoorLimits(NamedTuple):
 
     Attributes:
         width: of a door [pixels].
+        opening: width of an opening in a wall, or of a corridor's mouth [pixels].
         wall: thickness of a wall with a door [pixels].
         reach: distance beside a door in which the free space is examined [pixels].
         passage: least length of a passage behind its mouth [pixels].
     """
 
     width: float
+    opening: float
     wall: float
     reach: int
     passage: int
-
-
-class _Place(NamedTuple):
-    """A point, row and column [pixels], and a direction, a unit vector."""
-
-    row: float
-    col: float
-    down: float
-    right: float
-
-
-@lean_inner_kernel
-def _holds(row: int, col: int, shape: tuple[int, int]) -> bool:
-    return 0 <= row < shape[0] and 0 <= col < shape[1]
 
 
 @lean_inner_kernel
@@ -99,20 +69,7 @@ def _is_ridge(clearance: NDArray[np.int32], row: int, col: int) -> bool:
 
 
 @lean_inner_kernel
-def _way(solid: NDArray[np.bool_], place: _Place, most: float) -> float:
-    """Return how far free pixels reach from a place in its direction, at most ``most`` [pixels]."""
-    way = 0.5
-    while way < most:
-        row = int(np.floor(place.row + way * place.down))
-        col = int(np.floor(place.col + way * place.right))
-        if not _holds(row, col, solid.shape) or solid[row, col]:
-            break
-        way += 0.5
-    return way
-
-
-@lean_inner_kernel
-def _face(pixels: RoomPixels, place: _Place, most: float) -> float:
+def _face(pixels: RoomPixels, place: Place, most: float) -> float:
     """Return how far a wall reaches from a place inside it, in the place's direction [pixels].
 
     Negative if the wall ends at unseen pixels, 0 if it reaches further than ``most``.
@@ -121,7 +78,7 @@ def _face(pixels: RoomPixels, place: _Place, most: float) -> float:
     while way <= most:
         row = int(np.floor(place.row + way * place.down))
         col = int(np.floor(place.col + way * place.right))
-        if not _holds(row, col, pixels.solid.shape) or pixels.unseen[row, col]:
+        if not holds(row, col, pixels.solid.shape) or pixels.unseen[row, col]:
             return -way
         if not pixels.solid[row, col]:
             return way
@@ -139,7 +96,7 @@ def _nearest_solid(pixels: RoomPixels, row: float, col: float) -> tuple[int, int
     found_row, found_col, is_wall, nearest = -1, -1, False, 9.0
     for there_row in range(at_row - 1, at_row + 2):
         for there_col in range(at_col - 1, at_col + 2):
-            if not _holds(there_row, there_col, pixels.solid.shape):
+            if not holds(there_row, there_col, pixels.solid.shape):
                 continue
             is_wall = is_wall or pixels.occupied[there_row, there_col]
             if not pixels.solid[there_row, there_col]:
@@ -154,7 +111,7 @@ def _nearest_solid(pixels: RoomPixels, row: float, col: float) -> tuple[int, int
 
 
 @lean_inner_kernel
-def _jamb_along(pixels: RoomPixels, end: _Place, wall: float) -> int:
+def _jamb_along(pixels: RoomPixels, end: Place, wall: float) -> int:
     """Return the kind of the jamb that continues a chord beyond its end, straight on."""
     marks, kind = 0, THIN
     left_before, right_before = 0.0, 0.0
@@ -170,8 +127,8 @@ def _jamb_along(pixels: RoomPixels, end: _Place, wall: float) -> int:
             continue
         if at_row != int(np.floor(row)) or at_col != int(np.floor(col)):
             row, col = at_row + 0.5, at_col + 0.5
-        left = _face(pixels, _Place(row, col, -end.right, end.down), wall)
-        right = _face(pixels, _Place(row, col, end.right, -end.down), wall)
+        left = _face(pixels, Place(row, col, -end.right, end.down), wall)
+        right = _face(pixels, Place(row, col, end.right, -end.down), wall)
         if left <= 0.0 and right <= 0.0:
             if left < 0.0 or right < 0.0:
                 return NONE
@@ -191,7 +148,7 @@ def _jamb_along(pixels: RoomPixels, end: _Place, wall: float) -> int:
 
 
 @lean_inner_kernel
-def _jamb(pixels: RoomPixels, end: _Place, wall: float) -> int:
+def _jamb(pixels: RoomPixels, end: Place, wall: float) -> int:
     """Return the kind of the jamb at the end of a chord."""
     best = _jamb_along(pixels, end, wall)
     for turned in range(3):
@@ -199,7 +156,7 @@ def _jamb(pixels: RoomPixels, end: _Place, wall: float) -> int:
             if best >= HALF_SEEN:
                 return best
             turn, aside = (turned - 1) * TURN, (moved - 1) * ASIDE
-            place = _Place(
+            place = Place(
                 end.row - aside * end.right,
                 end.col + aside * end.down,
                 end.down + turn * end.right,
@@ -211,30 +168,35 @@ def _jamb(pixels: RoomPixels, end: _Place, wall: float) -> int:
 
 
 @lean_inner_kernel
-def _widest(clearance: NDArray[np.int32], place: _Place, reach: int) -> int:
-    """Return the largest squared clearance along a line from a place [pixels^2]."""
-    widest = 0
-    for way in range(1, reach + 1):
-        row = int(np.floor(place.row + way * place.down))
-        col = int(np.floor(place.col + way * place.right))
-        if not _holds(row, col, clearance.shape) or clearance[row, col] == 0:
-            break
-        widest = max(widest, clearance[row, col])
-    return widest
+def _certainty(
+    pixels: RoomPixels, first: Place, last: Place, centre: tuple[int, int], limits: DoorLimits
+) -> int:
+    """Return the certainty of a door or mouth between two jambs, no wider than a door; 0 if none.
 
-
-@lean_inner_kernel
-def _is_mouth(
-    clearance: NDArray[np.int32], inside: _Place, outside: _Place, narrow: int, wide: int, here: int
-) -> bool:
-    """Return whether a gap stays narrow for ``narrow`` pixels, and widens within ``wide``."""
-    for way in range(1, narrow + 1):
-        row = int(np.floor(inside.row + way * inside.down))
-        col = int(np.floor(inside.col + way * inside.right))
-        if not _holds(row, col, clearance.shape) or not 0 < clearance[row, col] <= EVEN * here:
-            return False
-    widens: bool = _widest(clearance, outside, wide) >= MOUTH * here
-    return widens
+    Args:
+        first, last: both ends of the chord, each with the direction away from the other.
+        centre: the pixel that the chord was laid through.
+    """
+    kind = _jamb(pixels, first, limits.wall)
+    if kind == NONE:
+        return 0
+    other_kind = _jamb(pixels, last, limits.wall)
+    if other_kind == NONE:
+        return 0
+    clearance, here = pixels.clearance, pixels.clearance[centre]
+    row, col, down, right = centre[0] + 0.5, centre[1] + 0.5, first.down, first.right
+    left, right_of = Place(row, col, -right, down), Place(row, col, right, -down)
+    if kind + other_kind >= LEAST_SURE:
+        one = widest(clearance, left, limits.reach)
+        other = widest(clearance, right_of, limits.reach)
+        least = OTHER_HALF_SEEN if HALF_SEEN in (kind, other_kind) else OTHER
+        separates = max(one, other) >= WIDER * here and min(one, other) >= least * here
+    else:
+        wide = int(np.hypot(first.row - last.row, first.col - last.col))
+        separates = is_mouth(clearance, left, right_of, limits.passage, wide, here) or is_mouth(
+            clearance, right_of, left, limits.passage, wide, here
+        )
+    return kind + other_kind if separates else 0
 
 
 @lean_inner_kernel
@@ -247,45 +209,29 @@ def _door_at(
 ) -> bool:
     """Fill in the door through a pixel, as a row of ``find_doors``; return whether there is one."""
     row, col = centre[0] + 0.5, centre[1] + 0.5
-    shortest, ahead, chord = limits.width, 0.0, -1
+    is_wider = 4 * pixels.clearance[centre] > limits.width * limits.width
+    shortest, ahead, chord = limits.opening if is_wider else limits.width, 0.0, -1
     for number in range(len(directions)):
         down, right = directions[number]
-        one = _way(pixels.solid, _Place(row, col, down, right), shortest)
+        one = way(pixels.solid, Place(row, col, down, right), shortest)
         if one >= shortest:
             continue
-        other = _way(pixels.solid, _Place(row, col, -down, -right), shortest - one)
+        other = way(pixels.solid, Place(row, col, -down, -right), shortest - one)
         if one + other < shortest:
             shortest, ahead, chord = one + other, one, number
     behind = shortest - ahead
     if chord < 0 or abs(ahead - behind) > OFF_CENTRE:
         return False
     down, right = directions[chord]
-    first = _Place(row + ahead * down, col + ahead * right, down, right)
-    kind = _jamb(pixels, first, limits.wall)
-    if kind == NONE:
-        return False
-    last = _Place(row - behind * down, col - behind * right, -down, -right)
-    other_kind = _jamb(pixels, last, limits.wall)
-    if other_kind == NONE:
-        return False
-    clearance, here = pixels.clearance, pixels.clearance[centre]
-    left, right_of = _Place(row, col, -right, down), _Place(row, col, right, -down)
-    if kind + other_kind >= LEAST_SURE:
-        one = _widest(clearance, left, limits.reach)
-        other = _widest(clearance, right_of, limits.reach)
-        least = OTHER_HALF_SEEN if HALF_SEEN in (kind, other_kind) else OTHER
-        if max(one, other) < WIDER * here or min(one, other) < least * here:
-            return False
+    first = Place(row + ahead * down, col + ahead * right, down, right)
+    last = Place(row - behind * down, col - behind * right, -down, -right)
+    if is_wider:
+        certainty = THICK + THICK if is_wide(pixels, first, last, centre, shortest) else 0
     else:
-        narrow, wide = limits.passage, int(shortest)
-        if not (
-            _is_mouth(clearance, left, right_of, narrow, wide, here)
-            or _is_mouth(clearance, right_of, left, narrow, wide, here)
-        ):
-            return False
+        certainty = _certainty(pixels, first, last, centre, limits)
     door[0], door[1], door[2], door[3] = first.row, first.col, last.row, last.col
-    door[4] = kind + other_kind
-    return True
+    door[4] = certainty
+    return certainty > 0
 
 
 @kernel
@@ -307,12 +253,15 @@ def find_doors(
         limits: on the size of a door.
     """
     rows, cols = pixels.solid.shape
-    most = int((limits.width / 2 + 1) ** 2)
+    most, widest = int((limits.width / 2 + 1) ** 2), int((limits.opening / 2) ** 2)
     doors, count = np.empty((MOST_GAPS, 5)), 0
     for row in range(1, rows - 1):
         for col in range(1, cols - 1):
-            if not (middles[row, col] and 4 <= pixels.clearance[row, col] <= most):
+            here = pixels.clearance[row, col]
+            if not (middles[row, col] and 4 <= here <= widest and count < MOST_GAPS):
                 continue
-            if count < MOST_GAPS and _is_ridge(pixels.clearance, row, col):
+            if _is_ridge(pixels.clearance, row, col) and (
+                here <= most or may_be_wide(pixels.clearance, row, col, directions)
+            ):
                 count += _door_at(pixels, (row, col), directions, limits, doors[count])
     return doors[:count].copy()
