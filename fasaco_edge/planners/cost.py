@@ -80,6 +80,10 @@ class CoverageCost:
         _require("cell_m / speed_m_s", step_s, SHORTEST_STEP_S, LONGEST_S, "s")
         return cls(step_s, quarter_turn_s)
 
+    def paced(self, step_s: float) -> Self:
+        """Return this cost with steps of ``step_s`` [s], or of the nearest allowed duration."""
+        return replace(self, step_s=min(max(step_s, SHORTEST_STEP_S), LONGEST_S))
+
     def along(self, lanes: Lanes) -> Self:
         """Return this cost with a preference for lanes in a direction."""
         across_s = PRICE_ACROSS * (self.step_s + self.quarter_turn_s)

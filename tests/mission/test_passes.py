@@ -11,7 +11,7 @@ from fasaco_edge.mission.core.lattice_layout import LatticeLayout
 from fasaco_edge.mission.events import CommandReceived, MapReceived, PlanReady, State
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.work.order_state import OrderState
-from fasaco_edge.planners.cost import SearchWork
+from fasaco_edge.planners.cost import SHORTEST_STEP_S, SearchWork
 from fasaco_edge.planners.passes import Laid
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
@@ -262,6 +262,9 @@ def test_cells_that_no_map_fits_on_are_given_up():
 def test_a_map_too_large_for_a_pass_gets_the_usual_cells():
     layout = LatticeLayout(CONFIG)
     assert layout.changes_for_pass(Laid(overlap=0.5), room(3.0, 2.4))
+    # Nor may narrower cells take the fastest robot less than the shortest step.
+    fastest = replace(CONFIG, cost=replace(CONFIG.cost, step_s=SHORTEST_STEP_S))
+    assert layout.sized(fastest).cost == fastest.cost
     layout._most_cells = 500
     assert layout.rotates_back_for([room(4.0, 3.0)])
     assert layout.cell_m == CONFIG.footprint.cell_m
@@ -272,10 +275,12 @@ def test_a_slow_pass_is_sent_with_its_speed():
     config = replace(CONFIG, speed_m_s=0.25)
     events = MapReceived(building(*HALL)), pose_at(0, 0)
     drive = Drive((0, 0), *events, config=config, order_state=OrderState.idle("no order yet"))
-    drive.command("start", {"passes": [{"speed_m_s": 0.3}]})
-    assert "passes: speed_m_s: expected at most robot.speed_m_s, 0.25, got 0.3" in str(
-        drive.refused
-    )
+    for speed, why in (
+        (0.3, "expected at most robot.speed_m_s, 0.25, got 0.3"),
+        (1e-300, "a cell in an hour, got 1e-300"),
+    ):
+        drive.command("start", {"passes": [{"speed_m_s": speed}]})
+        assert why in str(drive.refused)
     drive.command("start", {"passes": [{"speed_m_s": 0.1}, "auto"]})
     slow, usual = (problem for problem, _ in driven(drive).values())
     assert slow.cost.step_s == pytest.approx(2.5 * usual.cost.step_s)

@@ -104,7 +104,9 @@ def test_a_curve_fills_its_picture():
 
 
 def test_times_are_printed_as_on_a_clock():
-    assert [clock(s) for s in (0, 59.96, 61.5, 3600, 7325.25)] == [
+    assert [clock(s) for s in (-61.7, -0.04, 0, 59.96, 61.5, 3600, 7325.25)] == [
+        "-1:01.7",
+        "0:00.0",
         "0:00.0",
         "1:00.0",
         "1:01.5",

@@ -129,7 +129,7 @@ class LatticeLayout:
         if sweeping is not None:
             sweeping = replace(sweeping, tool_m=self._tool_m)
         footprint = replace(config.footprint, cell_m=self.cell_m)
-        cost = replace(config.cost, step_s=config.cost.step_s * scale)
+        cost = config.cost.paced(config.cost.step_s * scale)
         return replace(config, footprint=footprint, cost=cost, sweeping=sweeping)
 
     def restore(self, before: LedgerSnapshot, lay: Laid) -> bool:

@@ -23,6 +23,7 @@ from fasaco_edge.mission.rooms.room_watch import RoomWatch
 from fasaco_edge.mission.work.loss import check_loss
 from fasaco_edge.mission.work.order_state import OrderState, Stage
 from fasaco_edge.mission.work.sequencer import Sequencer
+from fasaco_edge.planners.cost import LONGEST_S
 
 OTHERS_FIRST = "priorities have changed"
 
@@ -107,15 +108,17 @@ class OrderChanges:
         return Answer(event.number, plan=plan), after
 
     def _check_passes(self, order: MissionOrder) -> None:
-        """Raise OrderError if a pass is too fast, or, in a fleet, needs cells of its own."""
+        """Raise OrderError if a pass has an impossible speed, or, in a fleet, cells of its own."""
         kinds = [kind for zone in order.zones for kind in zone.kinds]
-        fastest = max((kind.speed_m_s or 0.0 for kind in kinds), default=0.0)
         usual = self.config.speed_m_s
-        if usual and fastest > usual:
-            raise OrderError(
-                f"speed_m_s: expected at most robot.speed_m_s, {usual:g}, got {fastest:g}",
-                key="passes",
-            )
+        least = usual * self.config.cost.step_s / LONGEST_S
+        for speed in (kind.speed_m_s for kind in kinds if kind.speed_m_s and usual):
+            if speed > usual:
+                text = f"expected at most robot.speed_m_s, {usual:g}, got {speed:g}"
+                raise OrderError(f"speed_m_s: {text}", key="passes")
+            if speed < least:
+                text = f"expected at least {least:g}, a cell in an hour, got {speed:g}"
+                raise OrderError(f"speed_m_s: {text}", key="passes")
         for name in () if self.is_alone else ("angle_deg", "overlap"):
             if any(getattr(kind, name) is not None for kind in kinds):
                 raise OrderError(

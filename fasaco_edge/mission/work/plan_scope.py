@@ -102,7 +102,7 @@ class PlanScope:
         """Return the cost of paths in the present pass, by its lanes and its speed."""
         cost, usual_m_s, state = self._config.cost, self._config.speed_m_s, self._state()
         if state.speed_m_s and usual_m_s:
-            cost = replace(cost, step_s=cost.step_s * usual_m_s / state.speed_m_s)
+            cost = cost.paced(cost.step_s * usual_m_s / state.speed_m_s)
         return cost.along(state.current_pass.lanes)
 
     def walk_s(self, cells: NDArray[np.int32]) -> float:

@@ -94,9 +94,11 @@ class RobotClock:
 
 def clock(seconds: float) -> str:
     """Return a time of a recording as minutes and seconds, or with hours."""
-    minutes, rest = divmod(round(seconds, 1), 60)
+    tenths = round(seconds, 1)
+    minutes, rest = divmod(abs(tenths), 60)
     hours, minutes = divmod(int(minutes), 60)
-    return f"{hours}:{minutes:02d}:{rest:04.1f}" if hours else f"{minutes}:{rest:04.1f}"
+    text = f"{hours}:{minutes:02d}:{rest:04.1f}" if hours else f"{minutes}:{rest:04.1f}"
+    return f"-{text}" if tenths < 0 else text
 
 
 def known_of(statuses: Iterable[Arrival]) -> KnownSettings:
