@@ -32,6 +32,8 @@ from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rotation import rotated_points
+from fasaco_edge.mission.core.look_around import SIDE_M
+from fasaco_edge.mission.core.look_around import WHY as LOOKS_AROUND
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.path_exit import PathExit, PublishedPath
 from fasaco_edge.mission.events import (
@@ -220,7 +222,8 @@ class MissionTrial:
         about = f"{mission.state} ({mission.reason}), path {driven.revision}: {driven.reason}"
         rests = mission.state not in ("planning", "covering", "returning", "degraded")
         _hold(driven.stops or not rests, f"a path at rest: {about}")
-        _hold(driven.stops == (not len(route.path.cells)), f"another path than driven: {about}")
+        has_path = len(route.path.cells) > 0 or route.is_way_out
+        _hold(driven.stops != has_path, f"another path than driven: {about}")
         if not driven.stops:
             _hold(driven.revision == route.revision, f"{route.revision} is driven, {about}")
             self.counts["turns with a path in force"] += 1
@@ -370,11 +373,18 @@ class MissionTrial:
     def _check_line(self, xy: np.ndarray[Any, Any], reason: str) -> None:
         """Check that a line leads over places where the robot may be."""
         floor, grid = self._mission.map.ground.floor, self._mission.map.grid
-        assert floor is not None
         assert grid is not None
         _hold(bool(np.isfinite(xy).all()), "a line that leads nowhere")
-        unit_m = floor.geometry.resolution
         laid = rotated_points(xy, -self._mission.rotation.deg)
+        if reason == LOOKS_AROUND:
+            # On the spot, also where the map does not show that the robot may be there.
+            pose = self._mission.map.pose
+            assert pose is not None
+            away_m = np.hypot(*(laid - (pose.pose.x, pose.pose.y)).T).max()
+            _hold(away_m <= SIDE_M + 1e-6, f"a turn leads {away_m:.2f} m away")
+            return
+        assert floor is not None
+        unit_m = floor.geometry.resolution
         points = [map_to_raster(floor.geometry, x, y) for x, y in laid.tolist()]
         map_px = grid.geometry.resolution / unit_m
         wall = why_touching(floor.blocked, points, floor.discs.radius_m / unit_m, reason, map_px)

@@ -77,7 +77,7 @@ def test_a_keep_out_in_mid_mission_loses_nothing(robot):
     running, outsider = robot
     added = mission(running, "keep-out", "add", "--name", "vase", VASE)
     assert added.code == 0
-    assert "1, with vase" in added.out
+    assert "1: vase" in added.out
     # Negative corners are no options.
     corners = "-3,-1", "-2,-1", "-2,0"
     assert mission(running, "keep-out", "add", "--name", "lamp", *corners).code == 0

@@ -25,8 +25,9 @@ from fasaco_edge.states import State
 FEW_CELLS = 2
 # The robot turns along a triangle with this side [m], as followers drive along points.
 SIDE_M = 0.04
-# Time for the turn and for a map made after it [s].
-LOOK_S = 25.0
+# Time for the turn and for a map made after it [s]. A robot farther than AWAY_M [m] from the place
+# does not turn, or its pose has jumped.
+LOOK_S, AWAY_M = 25.0, 0.3
 WHY = "looks around: the map shows hardly more than the place where the robot stands"
 WAITS = "waits for a map that shows more than the place where the robot stands"
 
@@ -39,8 +40,8 @@ class LookAround:
         self._radius_m = config.footprint.robot_radius_m
         self._free_at_most = config.footprint.free_at_most
         self._can_turn = config.sweeping is None or config.sweeping.curves is None
-        # When the turn began [s].
-        self._since: float | None = None
+        # Where and when the turn began, x, y [m] and [s].
+        self._begun: tuple[Point, float] | None = None
 
     def turn(self, area: ReachableArea | None, now: float) -> Doing | None:
         """Turn the robot, and wait for a map that shows more; None if there is something to drive.
@@ -54,12 +55,14 @@ class LookAround:
             return None
         if not (_may_grow(area) if area is not None else self._map.is_on_unknown):
             return None
-        if self._since is None:
-            if self._route.revision or self._is_near_obstacle((stamped.pose.x, stamped.pose.y)):
+        here = stamped.pose.x, stamped.pose.y
+        if self._begun is None:
+            if self._route.revision or self._is_near_obstacle(here):
                 return None
-            self._since = now
+            self._begun = here, now
             update = self._route.publish_way_out(_triangle(stamped.pose), WHY, now)
-        if now - self._since <= LOOK_S:
+        place, since = self._begun
+        if now - since <= LOOK_S and math.dist(here, place) <= AWAY_M:
             return Doing(State.COVERING, WHY, update)
         is_alone = area is not None and np.count_nonzero(area.reachable) == 1
         waits = is_alone and not self._route.requests.plans
