@@ -287,33 +287,30 @@ class MapState:
     @property
     def is_kept_out(self) -> bool:
         """Whether a keep-out zone alone makes the robot's cell unusable."""
-        if self.ground.lattice is None or self.ground.free is None or self.pose is None:
-            return False
-        cell = self.ground.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
-        if not self.ground.lattice.contains(cell):
-            return False
-        place = self.ground.lattice.local(cell)
-        return bool(
-            self.ground.free.states[place] == COVERABLE != self.ground.lattice.states[place]
-        )
+        states = self._states_here()
+        return states is not None and states[0] == COVERABLE != states[1]
 
     @property
     def is_on_unknown(self) -> bool:
         """Whether the robot is in a cell that the map shows in part, or not at all."""
-        lattice, free = self.ground.lattice, self.ground.free
-        if lattice is None or free is None or self.pose is None:
-            return False
+        states = self._states_here()
+        return states is not None and states[0] == UNKNOWN
+
+    def _states_here(self) -> tuple[int, int] | None:
+        """Return the state of the robot's cell without and with keep-outs; None off the map."""
+        free, lattice = self.ground.free, self.ground.lattice
+        if free is None or lattice is None or self.pose is None:
+            return None
         cell = lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
-        return lattice.contains(cell) and bool(free.states[lattice.local(cell)] == UNKNOWN)
+        if not lattice.contains(cell):
+            return None
+        place = lattice.local(cell)
+        return int(free.states[place]), int(lattice.states[place])
 
     def why_misplaced(self) -> str:
         """Return why the robot's position is unusable, and which input it waits for."""
-        assert self.ground.free is not None
-        assert self.ground.lattice is not None
-        assert self.pose is not None
-        cell = self.ground.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
         waits = "waits for a map or a pose that puts it on free ground"
-        if not self.ground.lattice.contains(cell):
+        if self._states_here() is None:
             return f"robot is outside of the map: {waits}"
         if self.is_kept_out:
             return "robot is in a keep-out zone: waits to be driven out of it, or for another order"
