@@ -32,8 +32,7 @@ from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.mission.core.look_around import SIDE_M
-from fasaco_edge.mission.core.look_around import WHY as LOOKS_AROUND
+from fasaco_edge.mission.core import look_around
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.path_exit import PathExit, PublishedPath
 from fasaco_edge.mission.events import (
@@ -376,12 +375,12 @@ class MissionTrial:
         assert grid is not None
         _hold(bool(np.isfinite(xy).all()), "a line that leads nowhere")
         laid = rotated_points(xy, -self._mission.rotation.deg)
-        if reason == LOOKS_AROUND:
+        if reason == look_around.WHY:
             # On the spot, also where the map does not show that the robot may be there.
             pose = self._mission.map.pose
             assert pose is not None
             away_m = np.hypot(*(laid - (pose.pose.x, pose.pose.y)).T).max()
-            _hold(away_m <= SIDE_M + 1e-6, f"a turn leads {away_m:.2f} m away")
+            _hold(away_m <= look_around.SIDE_M + 1e-6, f"a turn leads {away_m:.2f} m away")
             return
         assert floor is not None
         unit_m = floor.geometry.resolution

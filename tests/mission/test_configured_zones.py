@@ -119,6 +119,7 @@ def test_a_mask_of_another_frame_than_the_maps_stops_the_robot(lattice_deg):
     drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0), config=config)
     # Askew, the room has few cells and unseen floor beside them: first the robot looks around.
     drive.tell(after=LOOK_S + 1.0)
+    drive.tell()
     drive.plan()
     assert drive.mission.state is State.COVERING
     drive.tell(MapReceived(building(*ROOM, frame="odom")))

@@ -64,7 +64,8 @@ def test_on_unknown_ground_it_looks_around_too():
     robot = LineRobot(np.full((60, 80), -1, np.int8), START)
     assert len(looked(robot)) == 1
     robot.wait(LOOK_S + 1.0, lambda robot: False)
-    assert "unknown ground" in robot.mission.reason
+    assert robot.mission.state == "blocked"
+    assert robot.mission.reason.startswith("robot is on unknown ground: waits for a map")
 
 
 def test_a_pause_stops_the_turn():
@@ -72,6 +73,14 @@ def test_a_pause_stops_the_turn():
     robot.command("pause")
     assert not robot.path
     assert robot.mission.state == "paused"
+
+
+def test_a_pose_that_jumps_ends_the_turn():
+    robot = LineRobot(first_scan(), START)
+    robot.is_stuck, robot.x = True, robot.x + 1.0
+    robot.wait(1.0, lambda robot: False)
+    assert not robot.path
+    assert robot.mission.state == "blocked"
 
 
 @pytest.mark.parametrize("why", ["obstacle", "cannot turn", "sees floor", "small room"])
@@ -85,5 +94,7 @@ def test_it_does_not_turn(why):
     elif why == "sees floor":
         pixels = first_scan(0.9)
     else:
+        # Its walls are far enough away for a turn.
+        pixels = first_scan(0.3)
         pixels[pixels < 0] = 100
     assert not looked(LineRobot(pixels, START, config))

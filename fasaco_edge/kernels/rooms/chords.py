@@ -48,37 +48,56 @@ def holds(row: int, col: int, shape: tuple[int, int]) -> bool:
 @lean_inner_kernel
 def way(solid: NDArray[np.bool_], place: Place, most: float) -> float:
     """Return how far free pixels reach from a place in its direction, at most ``most`` [pixels]."""
-    way = 0.5
-    while way < most:
-        row = int(np.floor(place.row + way * place.down))
-        col = int(np.floor(place.col + way * place.right))
+    far = 0.5
+    while far < most:
+        row = int(np.floor(place.row + far * place.down))
+        col = int(np.floor(place.col + far * place.right))
         if not holds(row, col, solid.shape) or solid[row, col]:
             break
-        way += 0.5
-    return way
+        far += 0.5
+    return far
 
 
 @lean_inner_kernel
 def widest(clearance: NDArray[np.int32], place: Place, reach: int) -> int:
     """Return the largest squared clearance along a line from a place [pixels^2]."""
-    widest = 0
-    for way in range(1, reach + 1):
-        row = int(np.floor(place.row + way * place.down))
-        col = int(np.floor(place.col + way * place.right))
+    most = 0
+    for far in range(1, reach + 1):
+        row = int(np.floor(place.row + far * place.down))
+        col = int(np.floor(place.col + far * place.right))
         if not holds(row, col, clearance.shape) or clearance[row, col] == 0:
             break
-        widest = max(widest, clearance[row, col])
-    return widest
+        most = max(most, clearance[row, col])
+    return most
+
+
+@lean_inner_kernel
+def sides(centre: tuple[int, int], chord: Place) -> tuple[Place, Place]:
+    """Return a pixel's middle with the directions to both sides of a chord through it."""
+    row, col = centre[0] + 0.5, centre[1] + 0.5
+    return Place(row, col, -chord.right, chord.down), Place(row, col, chord.right, -chord.down)
 
 
 @lean_inner_kernel
 def is_mouth(
+    clearance: NDArray[np.int32], one: Place, other: Place, narrow: int, wide: int, here: int
+) -> bool:
+    """Return whether a gap of clearance ``here`` is the mouth of a passage on either side.
+
+    The passage is at least ``narrow`` pixels long, and the space widens within ``wide`` before it.
+    """
+    return _leads_in(clearance, one, other, narrow, wide, here) or _leads_in(
+        clearance, other, one, narrow, wide, here
+    )
+
+
+@lean_inner_kernel
+def _leads_in(
     clearance: NDArray[np.int32], inside: Place, outside: Place, narrow: int, wide: int, here: int
 ) -> bool:
-    """Return whether a gap stays narrow for ``narrow`` pixels, and widens within ``wide``."""
-    for way in range(1, narrow + 1):
-        row = int(np.floor(inside.row + way * inside.down))
-        col = int(np.floor(inside.col + way * inside.right))
+    for far in range(1, narrow + 1):
+        row = int(np.floor(inside.row + far * inside.down))
+        col = int(np.floor(inside.col + far * inside.right))
         if not holds(row, col, clearance.shape) or not 0 < clearance[row, col] <= EVEN * here:
             return False
     widens: bool = widest(clearance, outside, wide) >= MOUTH * here

@@ -15,7 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
-from fasaco_edge.kernels.rooms.chords import WIDER, Place, RoomPixels, holds, is_mouth, way, widest
+from fasaco_edge.kernels.rooms.chords import (
+    WIDER,
+    Place,
+    RoomPixels,
+    holds,
+    is_mouth,
+    sides,
+    way,
+    widest,
+)
 from fasaco_edge.kernels.rooms.openings import is_wide, may_be_wide
 
 # Kinds of jambs, from worst to best: no wall; a thick wall or a corner; a wall that is thin as far
@@ -184,18 +193,14 @@ def _certainty(
     if other_kind == NONE:
         return 0
     clearance, here = pixels.clearance, pixels.clearance[centre]
-    row, col, down, right = centre[0] + 0.5, centre[1] + 0.5, first.down, first.right
-    left, right_of = Place(row, col, -right, down), Place(row, col, right, -down)
+    one, other = sides(centre, first)
     if kind + other_kind >= LEAST_SURE:
-        one = widest(clearance, left, limits.reach)
-        other = widest(clearance, right_of, limits.reach)
+        beside = widest(clearance, one, limits.reach), widest(clearance, other, limits.reach)
         least = OTHER_HALF_SEEN if HALF_SEEN in (kind, other_kind) else OTHER
-        separates = max(one, other) >= WIDER * here and min(one, other) >= least * here
+        separates = max(beside) >= WIDER * here and min(beside) >= least * here
     else:
         wide = int(np.hypot(first.row - last.row, first.col - last.col))
-        separates = is_mouth(clearance, left, right_of, limits.passage, wide, here) or is_mouth(
-            clearance, right_of, left, limits.passage, wide, here
-        )
+        separates = is_mouth(clearance, one, other, limits.passage, wide, here)
     return kind + other_kind if separates else 0
 
 

@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import lean_inner_kernel
-from fasaco_edge.kernels.rooms.chords import WIDER, Place, RoomPixels, holds, is_mouth, widest
+from fasaco_edge.kernels.rooms.chords import (
+    WIDER,
+    Place,
+    RoomPixels,
+    holds,
+    is_mouth,
+    sides,
+    widest,
+)
 
 # Squared clearance half the gap's width before and behind it, relative to that in the gap: least on
 # the wider side, and on the other.
@@ -70,14 +78,9 @@ def is_wide(
         gap: its width [pixels].
     """
     clearance, here = pixels.clearance, pixels.clearance[centre]
-    row, col, down, right = centre[0] + 0.5, centre[1] + 0.5, first.down, first.right
-    left, right_of = Place(row, col, -right, down), Place(row, col, right, -down)
+    one, other = sides(centre, first)
     reach = int(gap / 2.0)
-    one, other = widest(clearance, left, reach), widest(clearance, right_of, reach)
-    if min(one, other) >= WIDER * here:
+    if min(widest(clearance, one, reach), widest(clearance, other, reach)) >= WIDER * here:
         walls = _wall_length(pixels, first, gap) + _wall_length(pixels, last, gap)
         return walls >= STUBS * gap
-    narrow, wide = int(CORRIDOR * gap), int(gap)
-    return is_mouth(clearance, left, right_of, narrow, wide, here) or is_mouth(
-        clearance, right_of, left, narrow, wide, here
-    )
+    return is_mouth(clearance, one, other, int(CORRIDOR * gap), int(gap), here)

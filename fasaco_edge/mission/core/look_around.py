@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Point, Pose2D
+from fasaco_edge.grid.geometry import Point, Pose2D, Window
 from fasaco_edge.grid.lattice import UNKNOWN, beside
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.config import MissionConfig
@@ -40,8 +40,9 @@ class LookAround:
         self._radius_m = config.footprint.robot_radius_m
         self._free_at_most = config.footprint.free_at_most
         self._can_turn = config.sweeping is None or config.sweeping.curves is None
-        # Where and when the turn began, x, y [m] and [s].
+        # Where and when the turn began, x, y [m] and [s]; whether its path is in force.
         self._begun: tuple[Point, float] | None = None
+        self._turns = False
 
     def turn(self, area: ReachableArea | None, now: float) -> Doing | None:
         """Turn the robot, and wait for a map that shows more; None if there is something to drive.
@@ -50,33 +51,42 @@ class LookAround:
             area: the reachable area; None for a robot that is in no cell.
             now: time [s].
         """
+        if self._route.requests.plans or (self._begun is None and self._route.revision):
+            return None
         stamped, update = self._map.pose, None
-        if stamped is None or not self._can_turn or self._map.is_kept_out:
-            return None
-        if not (_may_grow(area) if area is not None else self._map.is_on_unknown):
-            return None
+        may_grow = self._map.is_on_unknown if area is None else _may_grow(area)
+        if stamped is None or not may_grow or not self._can_turn or self._map.is_kept_out:
+            return self._end(now) if area is None else None
         here = stamped.pose.x, stamped.pose.y
         if self._begun is None:
-            if self._route.revision or self._is_near_obstacle(here):
+            if self._is_near_obstacle(here):
                 return None
-            self._begun = here, now
+            self._begun, self._turns = (here, now), True
             update = self._route.publish_way_out(_triangle(stamped.pose), WHY, now)
         place, since = self._begun
-        if now - since <= LOOK_S and math.dist(here, place) <= AWAY_M:
+        if self._turns and now - since <= LOOK_S and math.dist(here, place) <= AWAY_M:
             return Doing(State.COVERING, WHY, update)
         is_alone = area is not None and np.count_nonzero(area.reachable) == 1
-        waits = is_alone and not self._route.requests.plans
-        return Doing(State.BLOCKED, WAITS) if waits else None
+        return self._end(now) or (Doing(State.BLOCKED, WAITS) if is_alone else None)
+
+    def _end(self, now: float) -> Doing | None:
+        """End the turn; None if it has ended before."""
+        was_turning, self._turns = self._turns, False
+        return Doing(State.BLOCKED, WAITS, self._route.stop(WAITS, now)) if was_turning else None
 
     def _is_near_obstacle(self, here: Point) -> bool:
         """Return whether the turn may touch an obstacle on the map."""
         grid = self._map.grid
         if grid is None:
             return True
+        whole = grid.geometry.window
         col, row = (math.floor(at) for at in grid.geometry.to_pixels(*here))
         reach = math.ceil((self._radius_m + SIDE_M) / grid.geometry.resolution)
-        around = grid.cells[max(row - reach, 0) : row + reach + 1].T[max(col - reach, 0) :]
-        return bool((around[: reach + min(reach, col) + 1] > self._free_at_most).any())
+        square = Window(row - reach, col - reach, row + reach + 1, col + reach + 1)
+        near = square.intersection(whole)
+        if near is None:
+            return False
+        return bool((grid.cells[near.slices_in(whole)] > self._free_at_most).any())
 
 
 def _may_grow(area: ReachableArea) -> bool:
