@@ -118,8 +118,8 @@ def test_a_mask_of_another_frame_than_the_maps_stops_the_robot(lattice_deg):
     config = replace(with_policy(CONFIG, keep_out_mask=mask), lattice_deg=lattice_deg)
     drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0), config=config)
     # Askew, the room has few cells and unseen floor beside them: first the robot looks around.
-    drive.tell(after=LOOK_S + 1.0)
-    drive.tell()
+    for seconds in (LOOK_S + 1.0, 2.0):
+        drive.tell(after=seconds)
     drive.plan()
     assert drive.mission.state is State.COVERING
     drive.tell(MapReceived(building(*ROOM, frame="odom")))
