@@ -20,14 +20,7 @@ from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
 from fasaco_edge.kernels.floor.polish import polish
 from fasaco_edge.kernels.floor.reorder import reorder
 from fasaco_edge.kernels.floor.seconds import chain_s
-from fasaco_edge.kernels.floor.sweeps import (
-    BLOCK,
-    COLUMNS,
-    NEVER,
-    Scratch,
-    Sweeps,
-    sweep_edges,
-)
+from fasaco_edge.kernels.floor.sweeps import BLOCK, COLUMNS, NEVER, Scratch, Sweeps, sweep_edges
 from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
 from fasaco_edge.kernels.lattice.polygons import BITS
 

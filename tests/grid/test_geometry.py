@@ -110,8 +110,7 @@ def test_grids_that_differ_by_whole_pixels_lie_on_one_raster(
 
 
 @pytest.mark.parametrize(
-    "other",
-    [Pose2D(0.012, 0.0), Pose2D(0.0, -0.0021), Pose2D(0.0, 0.0, 1e-3)],
+    "other", [Pose2D(0.012, 0.0), Pose2D(0.0, -0.0021), Pose2D(0.0, 0.0, 1e-3)]
 )
 def test_grids_that_differ_otherwise_do_not(other):
     geometry = GridGeometry(5, 6, 0.05, Pose2D(0.0, 0.0))

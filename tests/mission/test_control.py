@@ -6,15 +6,7 @@ from fasaco_edge.daemon.loop.mission_reports import zone_progress
 from fasaco_edge.errors import OrderError
 from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.work.order_state import OrderState
-from tests.mission.world import (
-    Drive,
-    answer,
-    building,
-    patch,
-    pose_at,
-    rectangle,
-    started,
-)
+from tests.mission.world import Drive, answer, building, patch, pose_at, rectangle, started
 
 ROOM = ("........",) * 6
 WEST, EAST = rectangle(0, 0, 6, 2), rectangle(0, 6, 6, 8)

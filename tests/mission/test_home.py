@@ -9,15 +9,7 @@ from msgspec import structs
 from fasaco_edge.mission.config import Dock, Place
 from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.work.order_state import OrderState
-from tests.mission.world import (
-    CELL,
-    CONFIG,
-    Drive,
-    building,
-    patch,
-    pose_at,
-    with_policy,
-)
+from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, with_policy
 
 ROOM = ("........",) * 6
 HOME = Place(x_m=0.5 * CELL, y_m=5.5 * CELL, yaw_deg=90.0)

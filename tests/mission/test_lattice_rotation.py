@@ -17,12 +17,7 @@ from fasaco_edge.mission.config import Dock, Place
 from fasaco_edge.mission.core.lattice_layout import WallWatch
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
-from fasaco_edge.mission.events import (
-    CommandReceived,
-    MapReceived,
-    PlanReady,
-    PoseReceived,
-)
+from fasaco_edge.mission.events import CommandReceived, MapReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.work.order_state import OrderState

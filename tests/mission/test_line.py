@@ -22,13 +22,7 @@ from fasaco_edge.kernels.floor.sweeps import NEVER
 from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
-from fasaco_edge.mission.events import (
-    CommandReceived,
-    MapReceived,
-    PlanReady,
-    PoseReceived,
-    State,
-)
+from fasaco_edge.mission.events import CommandReceived, MapReceived, PlanReady, PoseReceived, State
 from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.polyline import POLISHED
 from fasaco_edge.mission.line.tally import SweepTally

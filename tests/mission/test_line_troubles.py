@@ -96,11 +96,7 @@ def thin_walls():
 
 @pytest.mark.parametrize(
     ("free", "at", "swept"),
-    [
-        (lane(), (2.0, 1.0), 0.9),
-        (round_hall(), (1.9, 2.2), 0.95),
-        (thin_walls(), (0.8, 0.8), 0.95),
-    ],
+    [(lane(), (2.0, 1.0), 0.9), (round_hall(), (1.9, 2.2), 0.95), (thin_walls(), (0.8, 0.8), 0.95)],
     ids=["a free lane as wide as the robot", "no straight wall", "walls of single pixels"],
 )
 def test_an_odd_building_is_swept_and_no_wall_is_touched(free, at, swept):

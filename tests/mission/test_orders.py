@@ -206,10 +206,7 @@ def test_each_command_is_read():
         (added({}), "keep_out.name: missing"),
         (added({"name": "a"}), "keep_out.polygon: goes with keep_out_add, missing"),
         (added({"name": " a", "polygon": SQUARE}), "keep_out.name: must be 1..64 printable"),
-        (
-            added({"name": "a" * 65, "polygon": SQUARE}),
-            "keep_out.name: expected a text of at most",
-        ),
+        (added({"name": "a" * 65, "polygon": SQUARE}), "keep_out.name: expected a text of at most"),
         (
             added({"name": "a", "polygon": SQUARE[:2]}),
             "keep_out.polygon: expected a list of at least",

@@ -24,12 +24,7 @@ OTHER = (
 )
 OPEN = ("." * 14,) * 12
 # As the first, and askew enough to look another way from the other side.
-CORNER = (
-    "##############",
-    *("#......#######",) * 5,
-    *("#............#",) * 5,
-    "##############",
-)
+CORNER = ("##############", *("#......#######",) * 5, *("#............#",) * 5, "##############")
 OLD, NEW = MapReceived(building(*FLOOR)), MapReceived(building(*OTHER))
 
 

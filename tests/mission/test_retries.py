@@ -45,10 +45,7 @@ def test_a_room_with_a_shut_door_is_tried_again_later():
     drive.run(State.BLOCKED)
     waits = "17 cells not reached: tried again after 30 s (1 of 2)"
     assert drive.mission.reason == waits
-    assert reasons(drive) == [
-        (16, "closed off by obstacles"),
-        (1, "no longer free on the map"),
-    ]
+    assert reasons(drive) == [(16, "closed off by obstacles"), (1, "no longer free on the map")]
     assert drive.tell(after=29.0).plan is None
     decision = drive.tell(after=2.0)
     assert decision.plan.reason == "tried again, 1 of 2"

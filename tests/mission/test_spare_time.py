@@ -8,12 +8,7 @@ import pytest
 from fasaco_edge.daemon.loop.outbox import path_attachment
 from fasaco_edge.mission.core.path_exit import PublishedPath
 from fasaco_edge.mission.events import MapReceived, PlanReady
-from fasaco_edge.mission.path.plan_requests import (
-    NEW_WALK_SHARE,
-    SKIPPED_S,
-    Attempt,
-    SpareTime,
-)
+from fasaco_edge.mission.path.plan_requests import NEW_WALK_SHARE, SKIPPED_S, Attempt, SpareTime
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.planner import WorkLimit, never
@@ -188,9 +183,7 @@ def test_a_hopeless_attempt_is_not_repeated_with_each_pose(monkeypatch):
     tried_at = []
     attempt_at = Attempt.at
     monkeypatch.setattr(
-        Attempt,
-        "at",
-        lambda *asked, **how: tried_at.append(drive.now) or attempt_at(*asked, **how),
+        Attempt, "at", lambda *asked, **how: tried_at.append(drive.now) or attempt_at(*asked, **how)
     )
     for cell in hall.tolist():
         drive.tell(pose_at(*cell))

@@ -8,12 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.mission.coverage.floor_tiles import (
-    FLOOR_TILE,
-    NO_FLOOR,
-    PIXEL_M,
-    pixels_under,
-)
+from fasaco_edge.mission.coverage.floor_tiles import FLOOR_TILE, NO_FLOOR, PIXEL_M, pixels_under
 from fasaco_edge.mission.coverage.loop_closure import Motion, certain_floor
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.steady_track import PoseScatter, SteadyTrack

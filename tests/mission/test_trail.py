@@ -13,14 +13,7 @@ from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.living_trail import branching
 from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, started
 
-ROOMS = (
-    "..........",
-    "..........",
-    "....##....",
-    "....##....",
-    "..........",
-    "..........",
-)
+ROOMS = ("..........", "..........", "....##....", "....##....", "..........", "..........")
 TAU0 = np.float32(CONFIG.trail.tau0)
 
 
@@ -162,11 +155,7 @@ def test_a_plan_starts_from_the_trail():
 def test_missions_on_the_living_trail_are_reproducible():
     drives = []
     for _ in range(2):
-        drive = Drive(
-            (0, 0),
-            MapReceived(building(*(row[:5] for row in ROOMS))),
-            pose_at(0, 0),
-        )
+        drive = Drive((0, 0), MapReceived(building(*(row[:5] for row in ROOMS))), pose_at(0, 0))
         drive.plan()
         drive.go(MapReceived(building(*ROOMS)))
         drive.finish()

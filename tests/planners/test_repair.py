@@ -16,11 +16,7 @@ from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.search.effort import repair_for
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.planners.search.repair import (
-    MOST_PERTURBATIONS,
-    PERTURBATIONS_AT_ONCE,
-    repaired,
-)
+from fasaco_edge.planners.search.repair import MOST_PERTURBATIONS, PERTURBATIONS_AT_ONCE, repaired
 from fasaco_edge.planners.walk_before import HELD_CELLS, completed
 from tests.benchmarks.judge import check_walk
 from tests.support.examples import examples

@@ -5,11 +5,7 @@ import time
 import pytest
 
 from fasaco_edge.planners.cost import SearchWork
-from fasaco_edge.planners.planner import (
-    SearchProgress,
-    TimeBudget,
-    WorkLimit,
-)
+from fasaco_edge.planners.planner import SearchProgress, TimeBudget, WorkLimit
 
 
 def progress(steps=100, bound=0, **work):
