@@ -17,8 +17,7 @@ from tests.mission.world import CELL, patch, pose_at
 def test_a_low_robot_docks_charges_and_continues():
     drive = Battery(0.21)
     drive.run(State.COVERING)
-    for _ in range(20):
-        drive.go()
+    drive.go(times=20)
     assert drive.mission.state is State.COVERING
     drive.level = 0.2
     drive.go()
@@ -63,8 +62,7 @@ def test_it_continues_at_the_level_that_the_rest_needs():
     drive = Battery(0.19, rows=WALLED)
     drive.mission.charging.gauge._drains.extend([0.001] * 5)
     drive.run(State.CHARGING)
-    for _ in range(8):
-        drive.go()
+    drive.go(times=8)
     assert drive.mission.charging.goes_on_at == pytest.approx(0.3, abs=0.03)
     drive.charge(to=0.4)
     assert drive.level < 0.36
@@ -77,8 +75,7 @@ def test_floor_beyond_the_map_counts_as_work_left():
         drive = Battery(0.19, rows=(*WALLED[:-1], "####" + door + "#####"))
         drive.mission.charging.gauge._drains.extend([0.002] * 5)
         drive.run(State.CHARGING)
-        for _ in range(8):
-            drive.go()
+        drive.go(times=8)
         levels.append(drive.mission.charging.goes_on_at)
     # One cell at the border of the map, and 20 behind it, at 1.2 times 0.002 each.
     assert levels[1] - levels[0] == pytest.approx(0.048, abs=0.01)
@@ -102,8 +99,7 @@ def test_a_robot_docks_before_its_path_leads_far_from_the_dock(level, goes):
 def test_a_charge_that_jumps_and_comes_back_is_not_believed(lie):
     drive = Battery(0.6 if lie == 0.0 else 0.19)
     drive.run(State.COVERING if lie == 0.0 else State.CHARGING)
-    for _ in range(8):
-        drive.go()
+    drive.go(times=8)
     state, truth = drive.mission.state, drive.level
     for _ in range(5):
         drive.level = lie
@@ -114,8 +110,7 @@ def test_a_charge_that_jumps_and_comes_back_is_not_believed(lie):
         assert drive.mission.state is state
         assert drive.mission.charging.gauge.level == truth
     drive.level = lie
-    for _ in range(8):
-        drive.go()
+    drive.go(times=8)
     assert drive.mission.charging.gauge.level == lie, "what stays is true"
 
 
@@ -179,8 +174,7 @@ def test_full_counts_a_tenth_above_where_it_turned_back():
     drive.run(State.CHARGING)
     for level, goes in ((turned_at + 0.08, False), (turned_at + 0.12, True)):
         drive.level, drive.power = level, "charging"
-        for _ in range(8):
-            drive.go()
+        drive.go(times=8)
         drive.power = "full"
         drive.go()
         assert (drive.mission.state is not State.CHARGING) is goes
@@ -278,8 +272,7 @@ def test_a_battery_that_takes_no_more_is_enough():
     drive = Battery(0.15)
     drive.run(State.CHARGING)
     drive.level, drive.power = 0.88, "not charging"
-    for _ in range(20):
-        drive.go()
+    drive.go(times=20)
     assert drive.mission.state is State.CHARGING
     drive.tell(pose_at(*drive.cell), after=FULL_AFTER_S + 10.0)
     drive.go()
@@ -289,8 +282,7 @@ def test_a_battery_that_takes_no_more_is_enough():
 def test_a_battery_reported_full_on_the_way_changes_nothing():
     drive = Battery(0.9)
     drive.run(State.COVERING)
-    for _ in range(10):
-        drive.go()
+    drive.go(times=10)
     drive.level, drive.power = 0.15, "full"
     states = []
     while drive.mission.state is not State.CHARGING:
@@ -311,8 +303,7 @@ def test_a_charge_that_comes_in_coarse_steps_is_believed():
 def test_without_a_dock_it_charges_where_the_order_began():
     drive = Battery(0.6, (2, 3), dock=None)
     drive.run(State.COVERING)
-    for _ in range(4):
-        drive.go()
+    drive.go(times=4)
     drive.level = 0.1
     drive.run(State.CHARGING)
     assert drive.cell == (2, 3)

@@ -124,8 +124,7 @@ def resumed(before, cell, *events):
 
 def test_a_mission_continues_where_it_stopped():
     first = started(*HALL, cell=(1, 1))
-    for _ in range(60):
-        first.go()
+    first.go(times=60)
     again = resumed(after(first), first.cell, MapReceived(building(*HALL)), pose_at(*first.cell))
     assert again.visited == first.visited
     assert again.mission.covered.current.total == first.mission.covered.current.total
@@ -147,8 +146,7 @@ def test_a_finished_mission_stays_finished():
 
 def test_a_restarted_mapper_keeps_the_ledger():
     first = started(*HALL, cell=(1, 1))
-    for _ in range(60):
-        first.go()
+    first.go(times=60)
     small = building("...", "...", at=(1, 1))
     again = resumed(after(first), (1, 1), MapReceived(small), pose_at(1, 1))
     assert again.decisions[-1].faults == ()

@@ -25,8 +25,7 @@ def restarted(first, *events):
 @pytest.fixture
 def driven():
     drive = started(*HALL, cell=(1, 1))
-    for _ in range(6):
-        drive.go()
+    drive.go(times=6)
     return drive
 
 

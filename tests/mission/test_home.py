@@ -9,7 +9,17 @@ from msgspec import structs
 from fasaco_edge.mission.config import Dock, Place
 from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.work.order_state import OrderState
-from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, with_policy
+from tests.mission.world import (
+    CELL,
+    CONFIG,
+    building,
+    idle,
+    patch,
+    pose_at,
+    robot_in,
+    started,
+    with_policy,
+)
 
 ROOM = ("........",) * 6
 HOME = Place(x_m=0.5 * CELL, y_m=5.5 * CELL, yaw_deg=90.0)
@@ -17,17 +27,9 @@ HOME = Place(x_m=0.5 * CELL, y_m=5.5 * CELL, yaw_deg=90.0)
 DOCK = Dock(x_m=6.5 * CELL, y_m=5.5 * CELL, approach_m=2 * CELL)
 
 
-def robot(cell=(0, 0), order_state=None, **policy):
-    config = with_policy(CONFIG, **policy)
-    events = MapReceived(building(*ROOM)), pose_at(*cell)
-    return Drive(cell, *events, config=config, order_state=order_state)
-
-
 def covering(steps=5, **policy):
-    drive = robot(**policy)
-    drive.plan()
-    for _ in range(steps):
-        drive.go()
+    drive = started(*ROOM, config=with_policy(CONFIG, **policy))
+    drive.go(times=steps)
     return drive
 
 
@@ -119,15 +121,14 @@ def test_after_a_reset_home_is_where_the_next_order_begins():
     drive.command("reset")
     drive.command("start")
     drive.plan()
-    for _ in range(8):
-        drive.go()
+    drive.go(times=8)
     drive.command("home")
     arrive(drive)
     assert drive.cell == began != (0, 0)
 
 
 def test_without_a_home_the_command_is_refused():
-    drive = robot(order_state=OrderState.idle("no order yet"))
+    drive = idle(*ROOM)
     drive.command("home")
     assert str(drive.refused) == "there is no home yet"
 
@@ -163,7 +164,7 @@ def test_a_robot_carried_off_its_way_finds_another():
 
 
 def test_an_order_ends_at_home():
-    drive = robot((3, 3), OrderState.idle("no order yet"), home=HOME)
+    drive = idle(*ROOM, cell=(3, 3), config=with_policy(CONFIG, home=HOME))
     drive.command("start", {"return_home": True})
     drive.plan()
     drive.finish()
@@ -177,7 +178,7 @@ def test_the_errand_survives_a_restart():
     kept = OrderState.from_json(note)
     assert replace(kept, reached=None) == drive.mission.order_state
     assert drive.mission.order_state.errand == "home"
-    again = robot(drive.cell, OrderState.from_json(note))
+    again = robot_in(*ROOM, cell=drive.cell, order_state=OrderState.from_json(note))
     assert again.mission.state is State.RETURNING
 
 
@@ -189,7 +190,7 @@ def test_an_order_without_an_errand_is_readable_by_older_daemons():
 @pytest.mark.parametrize("how", ["home", "return_home"])
 def test_a_path_cut_off_by_a_map_behind_it_is_replaced_at_once(how):
     """Its own cell is blocked, the one beside it is not, and no way leads home from there."""
-    drive = Drive((0, 0), MapReceived(building("............")), pose_at(0, 0))
+    drive = robot_in("............")
     drive.finish()
     if how == "home":
         drive.command("home")

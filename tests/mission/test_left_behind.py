@@ -3,9 +3,8 @@
 import pytest
 
 from fasaco_edge.mission.config import Place
-from fasaco_edge.mission.events import MapReceived
-from fasaco_edge.mission.work.order_state import OrderState, Stage
-from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, with_policy
+from fasaco_edge.mission.work.order_state import Stage
+from tests.mission.world import CELL, CONFIG, idle, patch, with_policy
 
 # Home is in the small room.
 ROOMS = ("...#......", "...#......", "..........", "...#......")
@@ -18,8 +17,7 @@ SHUT, OPEN = patch("#", at=DOOR), patch(".", at=DOOR)
 def returning(retries=2, rows=ROOMS):
     """A robot that sets out for home while the door is shut."""
     config = with_policy(CONFIG, home=HOME, retries=retries, retry_s=5.0)
-    first = MapReceived(building(*rows)), pose_at(*START)
-    drive = Drive(START, *first, config=config, order_state=OrderState.idle("no order yet"))
+    drive = idle(*rows, cell=START, config=config)
     drive.command("start", {"return_home": True})
     drive.tell(SHUT)
     assert until(drive, lambda: drive.mission.order_state.stage is Stage.RETURNING)
@@ -30,9 +28,7 @@ def until(drive, holds, ticks=400):
     for _ in range(ticks):
         if holds():
             return True
-        if drive.request is not None:
-            drive.plan()
-        drive.go()
+        drive.tick()
     return holds()
 
 

@@ -20,7 +20,7 @@ from fasaco_edge.mission.coverage.loop_closure import (
 )
 from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from tests.mission.world import CELL, Drive, building, pixels, placed, pose_at
+from tests.mission.world import CELL, Drive, pixels, placed, pose_at, started
 
 FOOTPRINT = Footprint(0.3, 0.15)
 HOME = Pose2D(0.0, 0.0)
@@ -149,8 +149,7 @@ def closed(shift, *, together=True):
     """A robot on its path when the map moves by so many columns; the path ahead before that."""
     drive = Drive((1, 1), moved_hall(0), pose_at(1, 1))
     drive.plan()
-    for _ in range(4):
-        drive.go()
+    drive.go(times=4)
     ahead = [drive.cell, *drive.walk]
     row, col = drive.cell
     there = pose_at(row, col + shift)
@@ -195,8 +194,7 @@ def test_cells_of_a_turned_map_are_moved_one_by_one():
 
 
 def test_of_two_motions_the_path_before_the_first_moves_and_none_of_another_order_or_map():
-    drive = Drive((2, 2), MapReceived(building(*["." * 12] * 6)), pose_at(2, 2))
-    drive.plan()
+    drive = started(*["." * 12] * 6, cell=(2, 2))
     route, motion = drive.mission.route, drive.mission._handler.motion
     pose = pose_at(2, 2).pose.pose
     moved, path = replace(pose, x=pose.x + CELL), route.path.ahead

@@ -16,10 +16,10 @@ from tests.mission.world import (
     CONFIG,
     Drive,
     answer,
-    building,
     patch,
     pose_at,
     rectangle,
+    started,
     with_policy,
 )
 
@@ -30,9 +30,7 @@ DOOR = (1, 4)
 
 
 def drives(*rows, cell=(0, 0), config=RETRIES):
-    drive = Drive(cell, MapReceived(building(*rows)), pose_at(*cell), config=config)
-    drive.plan()
-    return drive
+    return started(*rows, cell=cell, config=config)
 
 
 def reasons(drive):

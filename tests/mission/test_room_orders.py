@@ -27,7 +27,7 @@ from fasaco_edge.mission.rooms.room_watch import PERIOD_S
 from fasaco_edge.mission.work import sequencer
 from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.passes import Pass
-from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle, with_policy
+from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle, robot_in, with_policy
 
 BOTH = (
     *(["..........#.........."] * 4),
@@ -41,16 +41,9 @@ WAITS = OrderState.idle("waits")
 LOOKS = 10
 
 
-def settled(*rows, order_state=WAITS, config=CONFIG):
+def settled(*rows, **members):
     """A robot whose map has shown its rooms for long enough."""
-    drive = Drive(
-        IN_WEST,
-        MapReceived(building(*rows)),
-        pose_at(*IN_WEST),
-        order_state=order_state,
-        config=config,
-    )
-    return settle(drive)
+    return settle(robot_in(*rows, cell=IN_WEST, **{"order_state": WAITS} | members))
 
 
 def settle(drive):
@@ -142,8 +135,7 @@ def test_an_equal_order_continues_after_its_room_has_grown():
     name(drive, 1, "hall")
     start(drive, "hall")
     drive.plan()
-    for _ in range(5):
-        drive.go()
+    drive.go(times=5)
     covered = len(drive.visited)
     drive.tell(MapReceived(building(*ONLY_WEST)))
     settle(drive)
@@ -251,8 +243,7 @@ def test_an_order_does_not_follow_a_room_that_gets_a_lost_number(is_cancelled):
         drive.command("cancel")
     kept = OrderState.from_json(drive.mission.order_state.to_json())
     (before,) = (kept.last or kept.order).zones
-    again = Drive(IN_WEST, MapReceived(building(*BOTH)), pose_at(*IN_WEST), order_state=kept)
-    settle(again)
+    again = settled(*BOTH, order_state=kept)
     state = again.mission.order_state
     (zone,) = (state.last or state.order).as_given.zones
     assert (zone.room, zone.polygon) == (0, before.polygon)
@@ -395,7 +386,7 @@ def test_a_look_that_fails_is_a_fault_and_the_robot_sweeps_on(monkeypatch):
         raise IndexError("index 0 is out of bounds")
 
     monkeypatch.setattr(room_watch, "find_rooms", fail)
-    drive = Drive(IN_WEST, MapReceived(building(*BOTH)), pose_at(*IN_WEST))
+    drive = robot_in(*BOTH, cell=IN_WEST)
     faults = []
     for _ in range(3):
         decision = drive.tell(MapReceived(building(*BOTH)), pose_at(*IN_WEST), after=PERIOD_S)

@@ -28,6 +28,7 @@ from tests.mission.world import (
     placed,
     pose_at,
     reachable_cells,
+    robot_in,
     started,
 )
 
@@ -55,7 +56,7 @@ def test_a_mission_waits_for_map_then_pose_then_requests_a_plan():
 
 
 def test_a_plan_that_comes_back_is_published():
-    drive = Drive((1, 2), MapReceived(building(*ROOM)), pose_at(1, 2))
+    drive = robot_in(*ROOM, cell=(1, 2))
     request = drive.request
     decision = drive.plan()
     assert drive.mission.state is State.COVERING
@@ -103,8 +104,7 @@ def test_a_map_that_touches_no_reachable_cell_changes_nothing():
 
 def test_a_grown_map_requests_a_plan_of_what_is_not_covered():
     drive = started("...", "...", cell=(1, 0))
-    for _ in range(2):
-        drive.go()
+    drive.go(times=2)
     here, visited = drive.cell, drive.visited
     assert len(visited) == 3
     decision = drive.tell(MapReceived(building("???..", "...##", "...??", "...??", at=(-1, 0))))
@@ -125,8 +125,7 @@ def test_a_grown_map_requests_a_plan_of_what_is_not_covered():
 
 def test_a_wall_across_the_path_cuts_it_at_the_last_legal_cell():
     drive = started(*CORRIDOR)
-    for _ in range(3):
-        drive.go()
+    drive.go(times=3)
     decision = drive.tell(patch("#", at=(0, 6)))
     assert decision.path.cells.tolist() == [[0, 3], [0, 4], [0, 5]]
     assert decision.path.reason == "path blocked at cell (0, 6)"
@@ -155,8 +154,7 @@ def test_a_closed_passage_between_reachable_cells_is_a_change():
 
 def test_a_robot_inside_a_wall_stops_and_says_why_and_recovers():
     drive = started("........", "........", "..####..", "..####..", "..####..", "..####..")
-    for _ in range(2):
-        drive.go()
+    drive.go(times=2)
     decision = drive.tell(pose_at(1, 3))
     assert drive.mission.state is State.BLOCKED
     reason = (
@@ -194,7 +192,7 @@ def test_a_map_that_jumps_far_away_takes_no_memory_in_between():
 
 
 def test_a_plan_that_comes_while_blocked_is_not_published():
-    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
+    drive = robot_in(*ROOM)
     drive.tell(MapReceived(building(*["######"] * 4)))
     decision = drive.plan()
     assert decision == Decision()
@@ -204,7 +202,7 @@ def test_a_plan_that_comes_while_blocked_is_not_published():
 
 
 def test_a_plan_that_a_map_change_made_illegal_is_refused():
-    drive = Drive((0, 0), MapReceived(building(*CORRIDOR)), pose_at(0, 0))
+    drive = robot_in(*CORRIDOR)
     stale = answer(drive.request)
     # The plan is still being made: no second one is asked for.
     assert drive.tell(patch("#", at=(0, 6))) == Decision()
@@ -232,8 +230,7 @@ def test_a_plan_leaves_out_what_was_driven_while_it_was_made():
     drive.tell(patch("#", at=(0, 9)))
     stale = answer(drive.request)
     drive.request = None
-    for _ in range(4):
-        drive.go()
+    drive.go(times=4)
     revision = drive.mission.route.revision
     # The rest of the plan is what is being driven: nobody needs to hear of it again.
     assert drive.tell(stale).path is None
@@ -242,7 +239,7 @@ def test_a_plan_leaves_out_what_was_driven_while_it_was_made():
 
 
 def test_an_answer_to_another_question_leaves_the_question_open():
-    drive = Drive((0, 0), MapReceived(building(*CORRIDOR)), pose_at(0, 0))
+    drive = robot_in(*CORRIDOR)
     path = CoveragePath(np.array([[0, 0], [0, 1]], np.int32), "fasaco", 0)
     assert drive.tell(PlanReady(drive.request.number + 1, path, 0.1)) == Decision()
     assert drive.mission.route.requests.is_planning

@@ -20,7 +20,7 @@ from fasaco_edge.mission.coverage.swept_floor import (
     MOST_FLOOR_TILES,
     SweptFloor,
 )
-from tests.mission.world import CELL, Drive, MapReceived, building, pose_at, rectangle
+from tests.mission.world import CELL, rectangle, started
 from tests.support.examples import examples
 
 TOOL = 0.3
@@ -298,8 +298,7 @@ def test_a_robot_that_stood_still_forgets_no_floor():
 
 
 def test_a_second_pass_forgets_the_floor_of_its_zone():
-    drive = Drive((0, 0), MapReceived(building("........")), pose_at(0, 0))
-    drive.plan()
+    drive = started("........")
     drive.finish()
     whole = drive.mission.covered.floor.pixels
     zone = {"name": "east", "polygon": rectangle(0, 0, 1, 4), "passes": 1}

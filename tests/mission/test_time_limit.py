@@ -111,8 +111,7 @@ def test_new_floor_does_not_reopen_an_order_out_of_time():
 def test_the_time_limit_survives_a_restart(covered):
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
-    for _ in range(covered):
-        drive.go()
+    drive.go(times=covered)
     kept = drive.mission.snapshot()
     drive.mission, drive.request = Mission(drive.config), None
     drive.mission.restore(kept, OrderState.from_json(kept.note))
@@ -144,11 +143,9 @@ def test_a_first_pose_and_a_clock_that_is_set_on_take_no_time():
 def test_pauses_count_and_a_paused_robot_stands():
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
-    for _ in range(10):
-        drive.go()
+    drive.go(times=10)
     drive.command("pause")
-    for _ in range(90):
-        drive.go()
+    drive.go(times=90)
     assert drive.mission.state is State.PAUSED
     drive.command("resume")
     drive.finish(ticks=20)
@@ -158,12 +155,10 @@ def test_pauses_count_and_a_paused_robot_stands():
 def test_the_order_of_a_robot_that_was_sent_home_ends_there():
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
-    for _ in range(10):
-        drive.go()
+    drive.go(times=10)
     drive.command("home")
     drive.run(State.PAUSED)
-    for _ in range(60):
-        drive.go()
+    drive.go(times=60)
     assert (drive.mission.state, drive.cell) == (State.DONE, (0, 0))
     assert drive.mission.reason.startswith("time is up after 1 min: ")
 

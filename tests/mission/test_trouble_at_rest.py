@@ -7,7 +7,7 @@ from fasaco_edge.mission.core.trouble import RULES
 from fasaco_edge.mission.events import BatteryReceived, MapReceived, State
 from fasaco_edge.wire.documents.replies import TROUBLES
 from tests.mission.battery import AT_DOCK, Battery
-from tests.mission.world import CONFIG, Drive, building, patch, pose_at, with_policy
+from tests.mission.world import CONFIG, Drive, building, patch, pose_at, robot_in, with_policy
 
 ROOM = (*["??????????"] * 2, *["##########"] * 3, *["........??"] * 6)
 PATIENT = {"lost_pose_s": 3.0, "stale_map_s": 40.0}
@@ -35,8 +35,7 @@ def live(drive, seconds, without="", **battery):
 def covering(level=0.8):
     drive = Battery(level, rows=ROOM, **PATIENT)
     drive.run(State.COVERING)
-    for _ in range(6):
-        drive.go()
+    drive.go(times=6)
     return drive
 
 
@@ -250,7 +249,7 @@ def test_a_trouble_keeps_the_time_when_it_began():
 
 
 def test_an_unused_battery_and_limits_of_0_are_no_trouble():
-    drive = Drive((0, 0), MapReceived(building("....")), pose_at(0, 0), config=CONFIG)
+    drive = robot_in("....")
     drive.command("pause")
     drive.tell(after=1000.0)
     assert (drive.mission.state, codes(drive)) == (State.PAUSED, [])

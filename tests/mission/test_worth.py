@@ -39,9 +39,7 @@ TIGHT_MIN = 2.5
 
 
 def tick(drive):
-    if drive.request is not None:
-        drive.plan()
-    drive.go()
+    drive.tick()
     drive.tell(after=0.9)
 
 
