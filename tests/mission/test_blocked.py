@@ -11,8 +11,9 @@ import pytest
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.config import MissionPolicy
-from fasaco_edge.mission.events import FollowerBlocked, PatchReceived
+from fasaco_edge.mission.events import CommandReceived, FollowerBlocked, PatchReceived
 from fasaco_edge.mission.map.obstacles import CLOSED_S, WIDEN_AFTER_S, Obstacles
+from fasaco_edge.mission.orders.order import read_order
 from tests.mission.line_robot import CONFIG, RADIUS_M, LineRobot, map_of
 
 # Distance that the follower keeps from things [m].
@@ -200,3 +201,40 @@ def test_updates_come_on_the_map_without_obstacles():
     assert robot.mission.lattice.coverable.sum() > closed - 4
     rows, cols = np.nonzero(robot.mission.map.grid.cells != room())
     assert (set(rows), set(cols)) == ({50, 51}, {70, 71})
+
+
+# What a follower meets says nothing of the building.
+
+
+def all_round(robot):
+    """A follower that says it meets something wherever it looks."""
+    angles = np.linspace(0.0, 6.2, 20).tolist()
+    points = tuple((robot.x + 0.4 * math.cos(a), robot.y + 0.4 * math.sin(a)) for a in angles)
+    return FollowerBlocked(0, "obstacle", 5.0, "map", robot.x, robot.y, points)
+
+
+def test_a_robot_that_is_crowded_keeps_its_ledger():
+    robot = LineRobot(two_rooms(), (1.0, 1.0))
+    robot.wait(45.0, lambda _: False)
+    covered = robot.mission.covered.current.total
+    for _ in range(1000):
+        robot.step(*([all_round(robot)] if robot.path and round(10 * robot.now) % 10 == 0 else []))
+        assert robot.mission.covered.current.total >= covered, robot.mission.reason
+        assert "another building" not in robot.mission.reason
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    assert robot.mission.coverage().remaining == 0
+
+
+def test_an_order_that_begins_in_a_crowd_is_not_done_in_it():
+    robot = LineRobot(two_rooms(), (1.0, 1.0))
+    robot.wait(30.0, lambda _: False)
+    robot.step(all_round(robot))
+    for tick in range(700):
+        robot.step(*([all_round(robot)] if robot.path and tick % 10 == 0 else []))
+    order = read_order({"return_home": True})
+    robot.step(CommandReceived(1, "start", order, discard=True))
+    for tick in range(600):
+        robot.step(*([all_round(robot)] if robot.path and tick % 10 == 0 else []))
+        assert robot.mission.state != "done"
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    assert robot.mission.coverage().remaining == 0

@@ -79,16 +79,6 @@ def test_a_lattice_too_far_from_zero_is_refused(x, y, cell_m):
         CoverageLattice.from_map(grid, Footprint(cell_m, cell_m / 2))
 
 
-def test_a_map_too_far_away_leaves_the_one_before():
-    drive = Drive((1, 1))
-    drive.tell(MapReceived(building(*ROOM)), pose_in((1, 1)))
-    drive.plan()
-    far = building(*ROOM, at=cells_of((FARTHEST_M, 0.0)))
-    (fault,) = drive.tell(MapReceived(far)).faults
-    assert isinstance(fault, MapTooFar)
-    drive.finish()
-
-
 def test_the_state_says_that_the_only_map_was_refused():
     drive = Drive((1, 1), config=CONFIG)
     drive.tell(MapReceived(building(*ROOM, at=cells_of((0.0, FARTHEST_M)))))

@@ -25,7 +25,7 @@ from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.grid.test_floor import room
-from tests.mission.test_line import CELL_M, CONFIG, ROBOT, START, Robot
+from tests.mission.test_line import CELL_M, CONFIG, ROBOT, START, Robot, robot_on
 from tests.mission.world import with_policy
 
 DEG = 30.0
@@ -166,9 +166,8 @@ def seen_around(grid, at, reach_m):
 
 def test_cells_align_with_the_walls_once_and_keep_swept_floor():
     grid = askew_building()
-    robot = Robot(Mission(AUTO), at=rotated_point(*START, DEG))
-    robot.tell(MapReceived(seen_around(grid, robot.at, 1.2)))
-    robot.drive(20)
+    start = rotated_point(*START, DEG)
+    robot = robot_on(seen_around(grid, start, 1.2), 20, at=start, config=AUTO)
     mission = robot.mission
     assert mission.rotation.deg == 0.0
     swept_m2, revision = mission.covered.floor.swept_m2, mission.route.revision
@@ -199,10 +198,8 @@ def test_cells_align_with_the_walls_once_and_keep_swept_floor():
 
 def test_a_map_too_small_for_askew_cells_has_them_along_its_axes():
     """A lattice askew over a map spans more cells than one along its axes."""
-    grid = turned(room(5.0, 4.0), DEG)
-    robot = Robot(Mission(replace(AUTO, max_lattice_cells=2600)), at=rotated_point(*START, DEG))
-    robot.tell(MapReceived(grid))
-    robot.drive(40)
+    grid, config = turned(room(5.0, 4.0), DEG), replace(AUTO, max_lattice_cells=2600)
+    robot = robot_on(grid, 40, at=rotated_point(*START, DEG), config=config)
     assert robot.mission.rotation.deg
     cells = np.pad(grid.cells, ((0, 0), (0, 276)), constant_values=-1)
     grown = OccupancyGrid(replace(grid.geometry, cols=cells.shape[1]), cells)
@@ -214,9 +211,7 @@ def test_a_map_too_small_for_askew_cells_has_them_along_its_axes():
 
 
 def test_floor_that_is_carried_over_lies_where_it_was():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(3.0, 2.4)))
-    robot.drive(60)
+    robot = robot_on(room(3.0, 2.4), 60)
     robot.mission.covered.break_track()
     before = robot.mission.snapshot()
     after = relaid_ledger(before, DEG, CELL_M)
@@ -241,9 +236,7 @@ def test_floor_that_is_carried_over_lies_where_it_was():
 
 
 def test_cells_of_another_size_count_by_their_centres():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(3.0, 2.4)))
-    robot.drive(60)
+    robot = robot_on(room(3.0, 2.4), 60)
     before = robot.mission.snapshot()
     after = relaid_ledger(before, 0.0, 0.5 * CELL_M)
     assert after.floor.tiles == before.floor.tiles

@@ -37,6 +37,7 @@ def test_another_order_says_how_much_it_would_forget():
     # The cell under the tool stays covered.
     said = "start forgets 11 covered cells (0.7 m2), 23 % of the floor in reach"
     assert refused(drive, "start", OTHER) == said
+    assert "11 covered cells" in refused(drive, "start", {"keep_out": [rectangle(4, 4, 5, 5)]})
     drive.command("start", OTHER, discard=True)
     assert drive.refused is None
     assert drive.visited == {drive.cell}
@@ -51,23 +52,14 @@ def test_a_reset_says_how_much_it_would_forget():
     assert refused(drive, "reset") is None, "there is nothing left to forget"
 
 
-def test_a_keep_out_in_a_new_order_forgets_but_a_named_one_keeps():
-    drive = covering(12)
-    assert "11 covered cells" in refused(drive, "start", {"keep_out": [rectangle(4, 4, 5, 5)]})
-
-
-@pytest.mark.parametrize("order", [None, {"keep_covered": True}, {**OTHER, "keep_covered": True}])
+@pytest.mark.parametrize(
+    "order", [None, {"keep_covered": True}, {**OTHER, "keep_covered": True}, EAST]
+)
 def test_an_order_that_forgets_nothing_needs_no_consent(order):
-    drive = covering(12)
+    drive = covering(6)
     covered = drive.visited
     assert refused(drive, "start", order) is None
     assert covered <= drive.visited
-
-
-def test_a_zone_where_nothing_is_covered_needs_no_consent():
-    drive = covering(6)
-    assert not any(col >= 6 for _, col in drive.visited)
-    assert refused(drive, "start", EAST) is None
 
 
 def test_coverage_of_a_cancelled_order_is_forgotten_by_consent():

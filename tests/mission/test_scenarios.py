@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.errors import MapTooLarge, PatchWithoutBase, WrongFrame
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
+from fasaco_edge.errors import MapTooFar, MapTooLarge, PatchWithoutBase, WrongFrame
+from fasaco_edge.grid.geometry import FARTHEST_M, GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
@@ -21,6 +21,7 @@ from fasaco_edge.mission.events import (
 )
 from fasaco_edge.planners.path import CoveragePath
 from tests.mission.world import (
+    CELL,
     Drive,
     answer,
     building,
@@ -262,21 +263,6 @@ def fault_of(drive, event):
     return fault
 
 
-def test_an_update_before_any_map_is_a_fault():
-    drive = Drive((0, 0))
-    (fault,) = drive.tell(patch("#")).faults
-    assert isinstance(fault, PatchWithoutBase)
-    assert str(fault) == "map update refused: there is no map yet"
-    assert drive.mission.state is State.WAITING_FOR_MAP
-
-
-def test_an_update_that_does_not_fit_is_a_fault():
-    drive = started(*ROOM)
-    for event in (patch("#", at=(0, 6)), patch("##", at=(3, 5)), patch(".", frame="odom")):
-        assert isinstance(fault_of(drive, event), PatchWithoutBase)
-    drive.finish()
-
-
 def test_updates_of_one_cycle_are_one_change_of_the_map():
     """A flood of small ones on a large map held the loop up for seconds, a copy for each."""
     drive, others = started(*ROOM), started(*ROOM)
@@ -304,19 +290,27 @@ def test_after_lost_updates_only_a_full_map_counts():
     assert np.count_nonzero(drive.mission.map.area.reachable) == 23
 
 
-def test_a_pose_or_map_in_another_frame_is_a_fault():
-    drive = started(*ROOM)
-    fault = fault_of(drive, pose_at(2, 2, frame="odom"))
-    assert isinstance(fault, WrongFrame)
-    assert str(fault) == "pose in frame 'odom', map in 'map'"
-    assert isinstance(fault_of(drive, MapReceived(building(*ROOM, frame="odom"))), WrongFrame)
-    drive.finish()
+HUGE = OccupancyGrid(GridGeometry(2, 2, 1e4, Pose2D(0, 0)), np.zeros((2, 2), np.int8))
+FAR = building(*ROOM, at=(0, round(FARTHEST_M / CELL)))
 
 
-def test_a_map_too_large_is_a_fault_and_the_old_one_stays():
+@pytest.mark.parametrize(
+    ("event", "fault", "said"),
+    [
+        (patch("#", at=(0, 6)), PatchWithoutBase, "update "),
+        (patch("##", at=(3, 5)), PatchWithoutBase, "update "),
+        (patch(".", frame="odom"), PatchWithoutBase, "update "),
+        (pose_at(2, 2, frame="odom"), WrongFrame, "pose in frame 'odom', map in 'map'"),
+        (MapReceived(building(*ROOM, frame="odom")), WrongFrame, "map in frame 'odom', "),
+        (MapReceived(HUGE), MapTooLarge, ""),
+        (MapReceived(FAR), MapTooFar, ""),
+    ],
+)
+def test_what_cannot_be_used_is_a_fault_and_changes_nothing(event, fault, said):
     drive = started(*ROOM)
-    huge = OccupancyGrid(GridGeometry(2, 2, 1e4, Pose2D(0, 0)), np.zeros((2, 2), np.int8))
-    assert isinstance(fault_of(drive, MapReceived(huge)), MapTooLarge)
+    found = fault_of(drive, event)
+    assert isinstance(found, fault)
+    assert str(found).startswith(said)
     drive.finish()
 
 
@@ -326,6 +320,7 @@ def test_a_bad_event_does_not_affect_the_others():
         patch("#"), MapReceived(building(*ROOM)), pose_at(0, 0, frame="odom"), pose_at(0, 0)
     )
     assert [type(fault) for fault in decision.faults] == [PatchWithoutBase, WrongFrame]
+    assert str(decision.faults[0]) == "map update refused: there is no map yet"
     assert decision.plan.problem.start == (0, 0)
 
 
