@@ -186,6 +186,10 @@ def lattice(grid):
     return CoverageLattice.from_map(grid, ROBOT)
 
 
+def test_maps_without_a_difference_agree_fully():
+    assert Agreement(0, (0, 0), 0).kappa == Agreement(100, (0, 0), 0).kappa == 1.0
+
+
 @pytest.mark.parametrize("reach_m", [3.5, 8.0, 100.0])
 def test_two_buildings_agree_by_chance_alone(buildings, reach_m):
     for one, other in permutations(MAPS, 2):
