@@ -15,6 +15,7 @@ from fasaco_edge.mission.events import CommandReceived, FollowerBlocked, PatchRe
 from fasaco_edge.mission.map.obstacles import CLOSED_S, WIDEN_AFTER_S, Obstacles
 from fasaco_edge.mission.orders.order import read_order
 from tests.mission.line_robot import CONFIG, RADIUS_M, LineRobot, map_of
+from tests.support.rooms import FREE, WALL, fill, room
 
 # Distance that the follower keeps from things [m].
 MARGIN_M = 0.06
@@ -24,19 +25,9 @@ START = (0.6, 0.6)
 TRIES_AGAIN = replace(CONFIG, policy=MissionPolicy(lost_pose_s=0.0))
 
 
-def room(cols=80):
-    """A room of 3 m x 4 m."""
-    pixels = np.full((60, cols), 100, np.int8)
-    pixels[1:59, 1 : cols - 1] = 0
-    return pixels
-
-
-def two_rooms():
-    """Two rooms with a door of 0.8 m between them."""
-    pixels = room(120)
-    pixels[:, 60:62] = 100
-    pixels[22:38, 60:62] = 0
-    return pixels
+ROOM = room(4.0, 3.0)
+# Two rooms with a door of 0.8 m between them.
+TWO_ROOMS = fill(fill(room(6.0, 3.0), 3.0, 0.0, 3.1, 3.0, WALL), 3.0, 1.1, 3.1, 1.9, FREE)
 
 
 class SeeingRobot(LineRobot):
@@ -93,7 +84,7 @@ def codes(robot):
 
 
 def test_it_sweeps_the_place_of_a_person_later():
-    robot = SeeingRobot(room(), START, disc(2.0, 1.5))
+    robot = SeeingRobot(ROOM, START, disc(2.0, 1.5))
     assert robot.wait(400.0, lambda robot: robot.held_s >= HELD_S)
     assert robot.wait(3.0, lambda robot: "blocked" in codes(robot))
     assert robot.mission.state == "degraded"
@@ -107,7 +98,7 @@ def test_it_sweeps_the_place_of_a_person_later():
 
 
 def test_a_lasting_obstacle_is_left_out_and_reported():
-    robot = SeeingRobot(two_rooms(), START, closed_door())
+    robot = SeeingRobot(TWO_ROOMS, START, closed_door())
     assert robot.wait(1500.0, lambda robot: robot.mission.state == "done")
     assert "not reached" in robot.mission.reason
     assert "%" in robot.mission.reason
@@ -118,7 +109,7 @@ def test_a_lasting_obstacle_is_left_out_and_reported():
 
 
 def test_a_door_that_opens_is_driven_through():
-    robot = SeeingRobot(two_rooms(), START, closed_door())
+    robot = SeeingRobot(TWO_ROOMS, START, closed_door())
     assert robot.wait(400.0, lambda robot: robot.held_s >= HELD_S)
     robot.wait(30.0, lambda robot: False)
     robot.hidden = []
@@ -129,7 +120,7 @@ def test_a_door_that_opens_is_driven_through():
 
 
 def test_a_path_that_cannot_be_joined_is_rebuilt_from_the_robot():
-    robot = LineRobot(room(), START)
+    robot = LineRobot(ROOM, START)
     assert robot.wait(60.0, lambda robot: robot.x > 1.0 or robot.y > 1.0)
     robot.is_stuck = True
     robot.wait(3.0, lambda robot: False)
@@ -146,7 +137,7 @@ def test_a_path_that_cannot_be_joined_is_rebuilt_from_the_robot():
 
 
 def test_a_report_of_another_path_or_frame_closes_nothing():
-    robot = LineRobot(room(), START)
+    robot = LineRobot(ROOM, START)
     ahead = ((1.0, 1.0),)
     maps = robot.mission.map.map_revision
     robot.step(FollowerBlocked(999, "obstacle ahead", 5.0, "map", robot.x, robot.y, ahead))
@@ -189,17 +180,17 @@ def test_a_map_that_is_too_large_to_be_kept_twice_stays_as_it_is(monkeypatch):
 
 def test_updates_come_on_the_map_without_obstacles():
     """What was drawn on it is gone once the floor is open again."""
-    robot = LineRobot(room(), START)
+    robot = LineRobot(ROOM, START)
     revision, here = robot.mission.route.revision, (robot.x, robot.y)
     robot.step(FollowerBlocked(revision, "obstacle", 5.0, "map", *here, ((2.0, 2.0),)))
     closed = robot.mission.coverage().coverable
     patch = MapPatch(Window(50, 70, 52, 72), np.full((2, 2), 100, np.int8))
     robot.step(PatchReceived(patch))
-    assert np.count_nonzero(robot.mission.grid.cells != room()) == 4
+    assert np.count_nonzero(robot.mission.grid.cells != ROOM) == 4
     robot.wait(CLOSED_S, lambda robot: False)
-    assert np.count_nonzero(robot.mission.grid.cells != room()) == 4
+    assert np.count_nonzero(robot.mission.grid.cells != ROOM) == 4
     assert robot.mission.lattice.coverable.sum() > closed - 4
-    rows, cols = np.nonzero(robot.mission.map.grid.cells != room())
+    rows, cols = np.nonzero(robot.mission.map.grid.cells != ROOM)
     assert (set(rows), set(cols)) == ({50, 51}, {70, 71})
 
 
@@ -214,7 +205,7 @@ def all_round(robot):
 
 
 def test_a_robot_that_is_crowded_keeps_its_ledger():
-    robot = LineRobot(two_rooms(), (1.0, 1.0))
+    robot = LineRobot(TWO_ROOMS, (1.0, 1.0))
     robot.wait(45.0, lambda _: False)
     covered = robot.mission.covered.current.total
     for _ in range(1000):
@@ -226,7 +217,7 @@ def test_a_robot_that_is_crowded_keeps_its_ledger():
 
 
 def test_an_order_that_begins_in_a_crowd_is_not_done_in_it():
-    robot = LineRobot(two_rooms(), (1.0, 1.0))
+    robot = LineRobot(TWO_ROOMS, (1.0, 1.0))
     robot.wait(30.0, lambda _: False)
     robot.step(all_round(robot))
     for tick in range(700):

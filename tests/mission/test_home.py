@@ -55,6 +55,7 @@ def test_it_drives_home_and_resume_continues_the_order(policy, there):
     drive = covering(**policy)
     decision = drive.command("home")
     assert (decision.path.reason, drive.mission.state) == ("drives home", State.RETURNING)
+    assert decision.path.end_yaw == {(0, 0): None, (5, 0): math.pi / 2, (5, 4): 0.0}[there]
     arrive(drive)
     assert (drive.cell, drive.walk) == (there, [])
     assert (drive.mission.state, drive.mission.reason) == (
@@ -89,13 +90,6 @@ def test_it_continues_at_the_nearer_end_of_the_rest():
     assert drive.request.problem.before.tolist() == left[::-1]
     drive.finish()
     assert len(drive.visited) == 48
-
-
-def test_the_way_home_ends_with_the_heading_of_that_place():
-    drive = covering(home=HOME)
-    assert drive.command("home").path.end_yaw == math.pi / 2
-    drive = covering()
-    assert drive.command("home").path.end_yaw is None
 
 
 def test_paused_on_the_way_home_it_stops_and_resumed_drives_home():

@@ -210,16 +210,19 @@ def test_a_map_too_small_for_askew_cells_has_them_along_its_axes():
     assert robot.line
 
 
-def test_floor_that_is_carried_over_lies_where_it_was():
+@pytest.mark.parametrize(("deg", "cell_m"), [(DEG, CELL_M), (0.0, 0.5 * CELL_M)])
+def test_floor_that_is_carried_over_lies_where_it_was(deg, cell_m):
     robot = robot_on(room(3.0, 2.4), 60)
     robot.mission.covered.break_track()
     before = robot.mission.snapshot()
-    after = relaid_ledger(before, DEG, CELL_M)
-    assert after.lattice_deg == DEG
+    after = relaid_ledger(before, deg, cell_m)
+    assert (after.lattice_deg, after.cell_m) == (deg, cell_m)
+    total = before.total * (CELL_M / cell_m) ** 2
+    assert after.total == pytest.approx(total, rel=0.25)
     assert after.floor.pixels == pytest.approx(before.floor.pixels, rel=0.01)
     # Pixels of the map frame, looked up in both.
     place = GridGeometry(80, 90, 0.05, Pose2D(1.5, 0.5))
-    there = rotated_geometry(place, -DEG)
+    there = rotated_geometry(place, -deg)
     was, now = (
         snapshot_of(ledger).swept_on(geometry)
         for ledger, geometry in ((before, place), (after, there))
@@ -229,23 +232,10 @@ def test_floor_that_is_carried_over_lies_where_it_was():
     rows, cols = np.nonzero(after.visits(Window(-20, -20, 60, 60)))
     assert len(rows)
     for row, col in zip((rows - 20).tolist(), (cols - 20).tolist(), strict=True):
-        x, y = rotated_point((col + 0.5) * CELL_M, (row + 0.5) * CELL_M, DEG)
+        x, y = rotated_point((col + 0.5) * cell_m, (row + 0.5) * cell_m, deg)
         pixel = Window(int(y / 0.025), int(x / 0.025), int(y / 0.025) + 1, int(x / 0.025) + 1)
         assert before.floor.swept_in(pixel).all()
     assert relaid_ledger(before, 0.0, CELL_M) is before
-
-
-def test_cells_of_another_size_count_by_their_centres():
-    robot = robot_on(room(3.0, 2.4), 60)
-    before = robot.mission.snapshot()
-    after = relaid_ledger(before, 0.0, 0.5 * CELL_M)
-    assert after.floor.tiles == before.floor.tiles
-    assert (after.cell_m, after.total) == (0.5 * CELL_M, pytest.approx(4 * before.total, rel=0.25))
-    rows, cols = np.nonzero(after.visits(Window(-20, -20, 60, 60)))
-    assert len(rows) == after.total
-    for row, col in zip((rows - 20).tolist(), (cols - 20).tolist(), strict=True):
-        y, x = ((at + 0.5) * after.cell_m // 0.025 for at in (row, col))
-        assert before.floor.swept_in(Window(int(y), int(x), int(y) + 1, int(x) + 1)).all()
 
 
 def snapshot_of(ledger):

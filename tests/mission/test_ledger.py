@@ -44,14 +44,6 @@ def counts(ledger, window=NEARBY):
     }
 
 
-def test_a_straight_drive_visits_each_cell_on_it_once():
-    ledger, entered = drive(*[(0.5, 0.5 + 0.1 * step) for step in range(51)])
-    assert counts(ledger) == {(0, col): 1 for col in range(6)}
-    assert ledger.total == 6
-    assert sum(len(cells) for cells in entered) == 6
-    assert entered[0] == {(0, 0)}
-
-
 def test_a_jump_is_not_swept():
     ledger, entered = drive((0.5, 0.5), (0.5, 0.6 + JUMP_CELLS))
     assert entered[1] == {(0, 2)}

@@ -92,8 +92,7 @@ def test_pixels_that_flicker_far_ahead_change_nothing_yet():
 
 def changes_nearby(seed):
     """Return how often the next metres changed in two minutes of flicker."""
-    pixels = np.full((80, 120), 100, np.int8)
-    pixels[1:-1, 1:-1] = 0
+    pixels = room(6.0, 4.0)
     random = np.random.default_rng(seed)
     robot = LineRobot(pixels, (1.0, 1.0))
     robot.wait(3.0, lambda robot: False)
@@ -114,8 +113,7 @@ def changes_nearby(seed):
 
 def test_a_robot_that_stands_gets_a_new_path_at_once():
     """On a bench, say, where somebody publishes maps and waits for paths."""
-    pixels = np.full((80, 120), 100, np.int8)
-    pixels[1:-1, 1:-1] = 0
+    pixels = room(6.0, 4.0)
     robot = LineRobot(pixels, (1.0, 1.0))
     robot.wait(3.0, lambda robot: False)
     robot.is_stuck = True

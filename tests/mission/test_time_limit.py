@@ -107,15 +107,20 @@ def test_new_floor_does_not_reopen_an_order_out_of_time():
     assert (drive.mission.state, drive.request) == (State.DONE, None)
 
 
+def restart(drive):
+    """Let another mission go on from what is kept, with the same clocks."""
+    kept = drive.mission.snapshot()
+    drive.mission, drive.request = Mission(drive.config), None
+    drive.mission.restore(kept, OrderState.from_json(kept.note))
+    drive.revision, drive.walk = 0, []
+
+
 @pytest.mark.parametrize("covered", [3, 20])
 def test_the_time_limit_survives_a_restart(covered):
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
     drive.go(times=covered)
-    kept = drive.mission.snapshot()
-    drive.mission, drive.request = Mission(drive.config), None
-    drive.mission.restore(kept, OrderState.from_json(kept.note))
-    drive.revision, drive.walk = 0, []
+    restart(drive)
     drive.tell(MapReceived(building(*HALL)), pose_at(*drive.cell), after=1000.0)
     left_s = drive.mission.time_limit.left_s
     assert 60.0 - covered - 8.0 <= left_s <= 60.0 - covered + 8.0
@@ -127,10 +132,7 @@ def test_the_time_limit_survives_a_restart(covered):
 def test_a_first_pose_and_a_clock_that_is_set_on_take_no_time():
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
-    kept = drive.mission.snapshot()
-    drive.mission, drive.request = Mission(drive.config), None
-    drive.mission.restore(kept, OrderState.from_json(kept.note))
-    drive.revision, drive.walk = 0, []
+    restart(drive)
     drive.tell(MapReceived(building(*HALL)))
     for stamp_s in (1_700_000_000, 1_700_003_600):
         pose = replace(pose_at(*drive.cell).pose, stamp_ns=stamp_s * 10**9)
