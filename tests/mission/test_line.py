@@ -636,7 +636,7 @@ def test_a_line_on_a_growing_map_never_becomes_worse():
 
 
 def test_a_changed_line_is_published_when_the_robot_is_near():
-    robot = robot_on(room(6.0, 3.0))
+    robot = robot_on(room(4.5, 2.4))
     robot.tell(times=100)
     told, ahead = len(robot.reasons), robot.mission.line._ahead
     robot.tell(times=100)

@@ -60,8 +60,11 @@ def assert_repeats(problem, path, config):
     assert again.cost_s == path.cost_s
 
 
-@pytest.mark.parametrize("cost", [STEPS_ALONE, TURNS], ids=["steps", "turns"])
-@pytest.mark.parametrize("room", ROOMS)
+# With turns the search of the largest room takes as long as all others.
+@pytest.mark.parametrize(
+    ("room", "cost"),
+    [each for each in product(ROOMS, (STEPS_ALONE, TURNS)) if each != ("rooms", TURNS)],
+)
 def test_a_search_ends_by_itself_and_that_repeats_too(room, cost):
     ground, start = ROOMS[room]
     problem = CoverageProblem.of(ground, start, end=start, cost=cost)
