@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid import occupancy
 from fasaco_edge.grid.geometry import RASTER_STEPS, GridGeometry, Pose2D, Window, union_bounds
-from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
-from tests.support.grids import on_raster
+from fasaco_edge.grid.occupancy import known_bounds
+from tests.support.grids import grid, on_raster
 
 METRES = st.floats(-1e3, 1e3)
 SIDES = st.integers(-20, 20)
@@ -137,18 +137,13 @@ def test_a_window_is_rounded_outward_to_chunks():
     assert Window(5, 8, 9, 12).in_chunks(4, 10, 40) == Window(4, 8, 10, 12)
 
 
-def grid(cells, yaw: float = 0.0) -> OccupancyGrid:
-    cells = np.asarray(cells, np.int8)
-    return OccupancyGrid(GridGeometry(*cells.shape, 0.1, Pose2D(0.0, 0.0, yaw)), cells)
-
-
 @pytest.mark.parametrize("block", [1, 12, 1_000_000])
 def test_known_bounds_follow_the_map_when_it_is_turned(monkeypatch, block):
     monkeypatch.setattr(occupancy, "BLOCK_PIXELS", block)
     cells = np.full((4, 6), -1)
     cells[1:3, 2:5] = 0
     assert known_bounds(grid(cells)) == pytest.approx((0.2, 0.1, 0.5, 0.3))
-    assert known_bounds(grid(cells, math.pi / 2)) == pytest.approx((-0.3, 0.2, -0.1, 0.5))
+    assert known_bounds(grid(cells, yaw=math.pi / 2)) == pytest.approx((-0.3, 0.2, -0.1, 0.5))
     assert known_bounds(grid(np.full((4, 6), -1))) is None
 
 

@@ -1,7 +1,5 @@
 """A share of the floor that is asked for: returns for what is missing, and when they end."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

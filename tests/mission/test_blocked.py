@@ -1,7 +1,5 @@
 """A robot whose follower meets what the map does not show: it sweeps elsewhere, and comes back."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

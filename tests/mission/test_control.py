@@ -8,7 +8,6 @@ from fasaco_edge.mission.events import MapReceived, State
 from tests.mission.world import (
     IDLE,
     Drive,
-    answer,
     building,
     cells,
     idle,
@@ -152,10 +151,8 @@ def test_another_order_after_a_pause_is_planned_from_nothing():
 
 def test_a_plan_for_the_order_before_is_not_driven():
     drive = robot_in(*ROOM)
-    stale = answer(drive.request)
     assert drive.command("start", TWO_ZONES).plan is None, "one plan at a time"
-    drive.request = None
-    decision = drive.tell(stale)
+    decision = drive.plan()
     assert decision.path is None
     assert decision.plan.reason == "zone 'east'"
     drive.finish()

@@ -10,7 +10,7 @@ from fasaco_edge.errors import LedgerMismatchError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
-from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.coverage.fit import Fit, Verdict
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
@@ -18,6 +18,7 @@ from fasaco_edge.mission.coverage.loop_closure import Motion
 from fasaco_edge.mission.events import Decision, MapReceived, State
 from fasaco_edge.mission.map.building_watch import FOREIGN, Agreement
 from tests.mission.world import Drive, building, pose_at, started
+from tests.support.grids import seen_around
 
 MAPS = ("office", "flat", "basement", "walled_grid", "warehouse")
 ROBOT = Footprint(0.3, 0.18)
@@ -48,10 +49,7 @@ def from_its_start(name):
 
 def seen_within(grid, reach_m):
     """What a mapper knows that was just switched on."""
-    pixels = np.argwhere(np.ones(grid.cells.shape, bool)) + 0.5
-    x, y = grid.geometry.to_map(pixels[:, 1], pixels[:, 0])
-    far = (np.hypot(x, y) > reach_m).reshape(grid.cells.shape)
-    return OccupancyGrid(grid.geometry, np.where(far, UNKNOWN, grid.cells).astype(np.int8))
+    return seen_around(grid, (0.0, 0.0), reach_m)
 
 
 def covered_all(grid):

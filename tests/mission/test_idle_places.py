@@ -1,7 +1,5 @@
 """Places that keep the robot out of nothing, or lie beside the map: they are named."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

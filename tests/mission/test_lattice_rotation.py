@@ -1,7 +1,5 @@
 """Cells at an angle to the map frame: given, or found by the walls, and what is carried over."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -27,6 +25,7 @@ from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.grid.test_floor import room
 from tests.mission.test_line import CELL_M, CONFIG, ROBOT, START, Robot, robot_on
 from tests.mission.world import with_policy
+from tests.support.grids import seen_around
 
 DEG = 30.0
 AUTO = replace(CONFIG, lattice_deg=None)
@@ -154,14 +153,6 @@ def askew_building():
     cells = grid.cells.copy()
     cells[1:50, 55:57] = 100
     return turned(OccupancyGrid(grid.geometry, cells), DEG)
-
-
-def seen_around(grid, at, reach_m):
-    """The same map, of which only what is near a point is known."""
-    col, row = grid.geometry.to_pixels(*at)
-    rows, cols = np.indices(grid.cells.shape)
-    near = np.hypot(rows - row, cols - col) * grid.geometry.resolution < reach_m
-    return OccupancyGrid(grid.geometry, np.where(near, grid.cells, -1).astype(np.int8))
 
 
 def test_cells_align_with_the_walls_once_and_keep_swept_floor():

@@ -35,7 +35,7 @@ from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.wire.documents.replies import FloorReport
 from tests.grid.test_floor import room
-from tests.grid.test_floor_map import part_of
+from tests.support.grids import cropped
 
 TOOL_M, RADIUS_M, CELL_M = 0.3, 0.18, 0.276
 ROBOT = SweepingRobot(TOOL_M, RADIUS_M, 0.25, 1.5)
@@ -366,7 +366,7 @@ def test_maps_that_grow_and_change_on_the_way(chunk, monkeypatch):
     monkeypatch.setattr(floor_map, "CHUNK", chunk)
     whole = with_obstacle(room(3.6, 3.0), 24, 30)
     rng = np.random.default_rng(3)
-    robot = robot_on(part_of(whole, 0, 0, 36, 40))
+    robot = robot_on(cropped(whole, 0, 0, 36, 40))
     (rows, cols), truth = whole.cells.shape, whole
     for number in range(14):
         robot.drive(int(rng.integers(2, 9)))
@@ -376,7 +376,7 @@ def test_maps_that_grow_and_change_on_the_way(chunk, monkeypatch):
             if abs(row - place[1]) + abs(col - place[0]) > 16:
                 truth = with_obstacle(truth, row, col, 3, int(rng.choice([0, 100])))
         low, high = rng.integers(0, 6, 2), (rows - rng.integers(0, 5), cols - rng.integers(0, 5))
-        robot.tell(MapReceived(part_of(truth, *low.tolist(), *(int(each) for each in high))))
+        robot.tell(MapReceived(cropped(truth, *low.tolist(), *(int(each) for each in high))))
         check_tally(robot.mission)
         assert_clear(robot, truth)
     robot.tell(MapReceived(truth))
@@ -389,14 +389,14 @@ def test_lines_begin_at_a_robot_slightly_off_its_line():
     whole, off_m = with_obstacle(room(3.6, 3.0), 24, 30), 0.02
     rng = np.random.default_rng(3)
     seen = np.array((36, 40))
-    robot = robot_on(part_of(whole, 0, 0, *seen.tolist()))
+    robot = robot_on(cropped(whole, 0, 0, *seen.tolist()))
     for _ in range(60):
         robot.drive(2)
         on_line, turn = robot.at, rng.uniform(0.0, math.tau)
         robot.at = (on_line[0] + off_m * math.cos(turn), on_line[1] + off_m * math.sin(turn))
         seen = np.minimum(seen + rng.integers(0, 3, 2), whole.cells.shape)
         told = len(robot.reasons)
-        robot.tell(MapReceived(part_of(whole, 0, 0, *seen.tolist())))
+        robot.tell(MapReceived(cropped(whole, 0, 0, *seen.tolist())))
         if len(robot.reasons) > told and robot.line:
             assert math.dist(robot.line[0], robot.at) < 2 * off_m
         robot.at = on_line
@@ -561,7 +561,7 @@ def test_on_its_way_home_it_sweeps_nothing_beside_it():
 
 @pytest.mark.parametrize(
     "other",
-    [lambda grid: shifted(grid, 0.012), lambda grid: part_of(grid, 0, 0, 40, 50)],
+    [lambda grid: shifted(grid, 0.012), lambda grid: cropped(grid, 0, 0, 40, 50)],
     ids=["on another raster", "of another size"],
 )
 def test_a_map_received_before_a_pose_is_swept_afterwards(other):

@@ -1,7 +1,5 @@
 """A line put together of pieces of the one before, and of stands between them."""
 
-from __future__ import annotations
-
 import itertools
 from itertools import pairwise
 

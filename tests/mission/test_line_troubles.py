@@ -1,7 +1,5 @@
 """The line of a mission on maps and with robots that nobody would wish for."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A robot whose first map shows hardly more than the place where it stands."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

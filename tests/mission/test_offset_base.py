@@ -1,7 +1,5 @@
 """What a mission claims to be swept by a base that drives beside its line."""
 
-from __future__ import annotations
-
 import pytest
 
 from fasaco_edge.daemon.loop.mission_reports import floor_report

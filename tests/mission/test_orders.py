@@ -1,7 +1,5 @@
 """Orders and commands as documents: what is read, and what is refused with which words."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """The published line holds still for the next metres, and changes far ahead wait."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What was reachable once, and no longer is: never counted as done, and said at the end."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A full new plan, asked for."""
 
-from __future__ import annotations
-
 import pytest
 
 from fasaco_edge.errors import CommandError

@@ -11,17 +11,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.work.uncovered import viewpoints_beside
-from tests.mission.world import (
-    CELL,
-    CONFIG,
-    Drive,
-    answer,
-    patch,
-    pose_at,
-    rectangle,
-    started,
-    with_policy,
-)
+from tests.mission.world import CELL, CONFIG, Drive, patch, pose_at, rectangle, started, with_policy
 
 RETRIES = with_policy(CONFIG, retries=2, retry_s=30.0)
 # A room behind a door in column 4.
@@ -128,8 +118,7 @@ def stands_short(drive, ticks):
         decision = drive.tell(short_of(drive, 0, 2), after=1.0)
         if decision.plan is not None:
             plans += 1
-            request, drive.request = drive.request, None
-            drive.tell(answer(request))
+            drive.plan()
     return plans
 
 
@@ -270,8 +259,7 @@ SHORT = 0.48
 def drive_short(drive, cells, *events):
     """Drive a cell in a second; into ``cells`` no farther than their edge, with no tool there."""
     if drive.request is not None:
-        request, drive.request = drive.request, None
-        drive.tell(answer(request))
+        drive.plan()
     before = drive.cell
     if drive.walk:
         drive.cell = drive.walk.pop(0)

@@ -1,7 +1,5 @@
 """Orders by room name: rooms found on the map, named, set, and swept by name."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

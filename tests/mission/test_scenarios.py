@@ -204,11 +204,9 @@ def test_a_plan_that_comes_while_blocked_is_not_published():
 
 def test_a_plan_that_a_map_change_made_illegal_is_refused():
     drive = robot_in(*CORRIDOR)
-    stale = answer(drive.request)
     # The plan is still being made: no second one is asked for.
     assert drive.tell(patch("#", at=(0, 6))) == Decision()
-    drive.request = None
-    decision = drive.tell(stale)
+    decision = drive.plan()
     assert decision.path is None
     assert decision.plan.problem.cells == 5
     assert decision.plan.reason == "map: 4 cells fewer"
@@ -218,10 +216,8 @@ def test_a_plan_that_a_map_change_made_illegal_is_refused():
 
 def test_a_plan_still_legal_after_a_map_change_is_driven():
     drive = Drive((0, 0), MapReceived(building(*CORRIDOR, "##########")), pose_at(1, 0))
-    stale = answer(drive.request)
     drive.tell(patch(".", at=(0, 9)))
-    drive.request = None
-    decision = drive.tell(stale)
+    decision = drive.plan()
     assert decision.path.cells[-1].tolist() == [1, 9]
     assert decision.plan.reason == "map: 1 cell more"
 
@@ -229,12 +225,10 @@ def test_a_plan_still_legal_after_a_map_change_is_driven():
 def test_a_plan_leaves_out_what_was_driven_while_it_was_made():
     drive = started(*CORRIDOR)
     drive.tell(patch("#", at=(0, 9)))
-    stale = answer(drive.request)
-    drive.request = None
     drive.go(times=4)
     revision = drive.mission.route.revision
     # The rest of the plan is what is being driven: nobody needs to hear of it again.
-    assert drive.tell(stale).path is None
+    assert drive.plan().path is None
     assert drive.mission.route.revision == revision
     assert drive.mission.route.path.ahead.tolist() == [[0, col] for col in range(4, 9)]
 

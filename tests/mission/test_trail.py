@@ -1,7 +1,5 @@
 """The living trail through a mission: it follows map, paths and robot, and outlives a restart."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

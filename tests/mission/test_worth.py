@@ -1,7 +1,5 @@
 """Floor by its priority: what comes first where time or battery do not allow all."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import numpy as np
