@@ -29,6 +29,8 @@ from tests.support.grids import seen_around
 
 DEG = 30.0
 AUTO = replace(CONFIG, lattice_deg=None)
+ROOM = room(3.0, 2.4)
+IN_YAW = replace(ROOM, geometry=rotated_geometry(ROOM.geometry, DEG))
 
 
 def turned(grid, deg):
@@ -44,10 +46,6 @@ def turned(grid, deg):
     cells = np.full(rows * cols, -1, np.int8)
     cells[inside] = grid.cells[row[inside], col[inside]]
     return OccupancyGrid(geometry, cells.reshape(rows, cols), grid.frame)
-
-
-def in_yaw(grid, deg):
-    return replace(grid, geometry=rotated_geometry(grid.geometry, deg))
 
 
 def first_path(mission, grid, at, order=None):
@@ -72,11 +70,11 @@ def test_a_turned_building_is_driven_like_a_straight_one(order):
     straight = Mission(with_policy(CONFIG, keep_out=(tuple(map(tuple, COLUMN)),)))
     around = tuple(rotated_point(x, y, DEG) for x, y in COLUMN)
     askew = Mission(with_policy(replace(CONFIG, lattice_deg=DEG), keep_out=(around,)))
-    path, _ = first_path(straight, room(3.0, 2.4), START, order)
+    path, _ = first_path(straight, ROOM, START, order)
     if order is not None:
         polygon = [rotated_point(x, y, DEG) for x, y in ZONE]
         order = {"zones": [{"name": "a", "polygon": polygon}]}
-    other, _ = first_path(askew, in_yaw(room(3.0, 2.4), DEG), rotated_point(*START, DEG), order)
+    other, _ = first_path(askew, IN_YAW, rotated_point(*START, DEG), order)
     assert (other.cells == path.cells).all()
     # Rounding decides where in a cell some of the line's points are.
     there = rotated_points(path.xy, DEG)
@@ -93,10 +91,10 @@ def test_a_turned_building_is_driven_like_a_straight_one(order):
 def test_an_added_keep_out_lies_where_that_of_an_order_lies():
     ordered, added = (Mission(replace(CONFIG, lattice_deg=DEG)) for _ in range(2))
     corners = tuple(rotated_point(x, y, DEG) for x, y in COLUMN)
-    grid, start = in_yaw(room(3.0, 2.4), DEG), rotated_point(*START, DEG)
-    path, _ = first_path(ordered, grid, start, {"keep_out": [corners]})
+    start = rotated_point(*START, DEG)
+    path, _ = first_path(ordered, IN_YAW, start, {"keep_out": [corners]})
     added.step([CommandReceived(1, "keep_out_add", keep_out=KeepOut("column", corners))], 0.0)
-    other, _ = first_path(added, grid, start, {})
+    other, _ = first_path(added, IN_YAW, start, {})
     assert (other.cells == path.cells).all()
     assert OrderState.from_json(added.snapshot().note).keep_out[0].polygon == corners
 
@@ -106,7 +104,7 @@ def test_a_way_home_ends_at_place_and_heading_in_the_map_frame():
     mission = Mission(
         with_policy(replace(CONFIG, lattice_deg=25.0), home=home, dock=Dock(x_m=9, y_m=9))
     )
-    grid, at = room(3.0, 2.4), StampedPose(Pose2D(*START), "map")
+    grid, at = ROOM, StampedPose(Pose2D(*START), "map")
     first_path(mission, grid, START)
     decision = mission.step([CommandReceived(1, "home")], 1.0)
     if decision.plan is not None:
@@ -123,7 +121,7 @@ def test_a_way_home_ends_at_place_and_heading_in_the_map_frame():
 def test_the_refusal_of_a_zone_off_the_map_uses_the_map_frame():
     mission = Mission(replace(CONFIG, lattice_deg=DEG))
     moon = {"zones": [{"name": "moon", "polygon": [[20, 20], [22, 20], [22, 22]]}]}
-    events = MapReceived(room(3.0, 2.4)), PoseReceived(StampedPose(Pose2D(*START), "map"))
+    events = MapReceived(ROOM), PoseReceived(StampedPose(Pose2D(*START), "map"))
     mission.step(events, 0.0)
     decision = mission.step([CommandReceived(1, "start", read_order(moon))], 0.1)
     (answer,) = decision.answers
@@ -134,7 +132,7 @@ def test_an_order_is_kept_to_the_last_bit_as_it_was_given():
     mission = Mission(replace(CONFIG, lattice_deg=17.3))
     zone = {"name": "a", "polygon": [[2.1, 1.1], [3.3, 1.2], [3.1, 2.7]]}
     order = read_order({"zones": [zone], "keep_out": [COLUMN]})
-    first_path(mission, room(3.0, 2.4), START, {"zones": [zone], "keep_out": [COLUMN]})
+    first_path(mission, ROOM, START, {"zones": [zone], "keep_out": [COLUMN]})
     assert mission.order_state.order != order
     kept = OrderState.from_json(mission.snapshot().note)
     assert kept.order == order
@@ -203,7 +201,7 @@ def test_a_map_too_small_for_askew_cells_has_them_along_its_axes():
 
 @pytest.mark.parametrize(("deg", "cell_m"), [(DEG, CELL_M), (0.0, 0.5 * CELL_M)])
 def test_floor_that_is_carried_over_lies_where_it_was(deg, cell_m):
-    robot = robot_on(room(3.0, 2.4), 60)
+    robot = robot_on(ROOM, 60)
     robot.mission.covered.break_track()
     before = robot.mission.snapshot()
     after = relaid_ledger(before, deg, cell_m)

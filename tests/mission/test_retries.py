@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.events import MapReceived, PoseReceived, State
@@ -106,16 +106,15 @@ def test_cells_covered_before_they_closed_are_no_loss():
     assert reasons(drive) == []
 
 
-def short_of(drive, row, col):
-    """The robot beside the centre of a cell: its tool does not come there."""
-    return PoseReceived(StampedPose(Pose2D((col + 0.02) * CELL, (row + 0.02) * CELL)))
+# Beside the centre of cell (0, 2): the tool does not come there.
+SHORT_OF = pose_at(-0.48, 1.52)
 
 
 def stands_short(drive, ticks):
     """The robot does not come to cell (0, 2), however often it is sent there."""
     plans, drive.cell = 0, (0, 2)
     for _ in range(ticks):
-        decision = drive.tell(short_of(drive, 0, 2), after=1.0)
+        decision = drive.tell(SHORT_OF, after=1.0)
         if decision.plan is not None:
             plans += 1
             drive.plan()
@@ -143,7 +142,7 @@ def test_a_robot_still_turning_in_its_last_cell_is_not_done():
     drive = drives("...")
     drive.go()
     drive.cell = (0, 2)
-    at = short_of(drive, 0, 2).pose
+    at = SHORT_OF.pose
     for number in range(8):
         turned = replace(at, pose=replace(at.pose, yaw=0.4 * number))
         assert drive.tell(PoseReceived(turned), after=0.5).plan is None

@@ -44,9 +44,9 @@ def settled(*rows, **members):
     return settle(robot_in(*rows, cell=IN_WEST, **{"order_state": WAITS} | members))
 
 
-def settle(drive):
+def settle(drive, frame="map"):
     for _ in range(LOOKS):
-        drive.tell(pose_at(*drive.cell), after=1.01 * PERIOD_S)
+        drive.tell(pose_at(*drive.cell, frame), after=1.01 * PERIOD_S)
         assert not drive.mission.rooms.sheet or len(drive.mission.rooms.rooms) < 5
     return drive
 
@@ -352,15 +352,10 @@ def test_rooms_of_another_frame_are_not_known_on_this_map():
     assert drive.mission.grid.frame == "upstairs"
     start(drive, "kitchen")
     assert drive.refused.code == "bad_order"
-    settle_in(drive, "upstairs")
+    settle(drive, "upstairs")
     assert len(drive.mission.rooms.rooms) == 2
     start(drive, "kitchen")
     assert "nor a room: there are room 3, room 4" in str(drive.refused)
-
-
-def settle_in(drive, frame):
-    for _ in range(LOOKS):
-        drive.tell(pose_at(*drive.cell, frame=frame), after=1.01 * PERIOD_S)
 
 
 def test_a_look_that_fails_is_a_fault_and_the_robot_sweeps_on(monkeypatch):

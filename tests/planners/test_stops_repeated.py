@@ -98,13 +98,10 @@ def test_the_search_after_a_poor_repair_is_short():
 # When searches end: by the clock or their work.
 
 
-def progress(steps=100, bound=0, **work):
-    return SearchProgress(SearchWork(**work), float(steps), steps, bound)
-
-
 def test_a_budget_is_used_up_with_time():
-    assert not TimeBudget(60.0)(progress())
-    assert TimeBudget(60.0, started=time.monotonic() - 60.0)(progress())
+    progress = SearchProgress(SearchWork(), 100.0, 100)
+    assert not TimeBudget(60.0)(progress)
+    assert TimeBudget(60.0, started=time.monotonic() - 60.0)(progress)
 
 
 @pytest.mark.parametrize(
