@@ -124,11 +124,11 @@ def test_a_fixed_end_stays(planned):
 
 
 def distances_m(grid, line: DrivenLine) -> np.ndarray:
-    """Return the distances to what is not free, at points 1 cm apart along a line [m]."""
+    """Return the distances to what is not free, at points 5 cm apart along a line [m]."""
     rows, cols = np.nonzero((grid.cells < 0) | (grid.cells > 25))
     found = []
     for a, b in pairwise(line.xy):
-        for x, y in np.linspace(a, b, math.ceil(math.dist(a, b) / 0.01), endpoint=False):
+        for x, y in np.linspace(a, b, math.ceil(math.dist(a, b) / 0.05), endpoint=False):
             col, row = grid.geometry.to_pixels(x, y)
             off = np.abs(np.stack([cols + 0.5 - col, rows + 0.5 - row])) - 0.5
             found.append(np.hypot(*np.maximum(off, 0.0)).min() * grid.geometry.resolution)
