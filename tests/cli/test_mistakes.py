@@ -132,7 +132,7 @@ def folder(tmp_path, monkeypatch):
         ("demo --map nowhere --out o", 1, "no map 'nowhere'"),
         ("follow --speed 0", 78, "--speed must be above 0 and at most 100, got 0"),
         ("demo --speed 0 --out o", 78, "--speed must be above 0, got 0.0"),
-        ("demo --out good.npy", 78, "cannot write good.npy: File exists"),
+        ("demo --out good.npy", 78, "cannot write good.npy: good.npy is not a folder"),
         ("plan office --passes cross", 78, "--passes[0]: cross goes after a pass with lanes"),
         ("plan office --passes auto@2", 78, "at 2 m/s is faster than the robot, 0.25 m/s"),
         ("plan office --passes auto --planner fasaco", 78, "only colony-search has passes"),
@@ -343,7 +343,21 @@ def test_a_recorder_without_a_folder_is_an_error(folder):
     with daemon_process(folder, bus={"listen": [endpoint]}), Outsider(endpoint):
         ended = fasaco_edge("record", "--out", "good.npy", "--connect", endpoint)
     assert ended.code == 78
-    assert "cannot record into good.npy: File exists" in ended.err
+    assert "cannot record into good.npy: good.npy is not a folder" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ("--state good.npy", "cannot keep progress in good.npy: good.npy is not a folder"),
+        ("--state good.npy/in", "cannot keep progress in good.npy/in: good.npy is not a folder"),
+        ("--record good.npy", "cannot record into good.npy: good.npy is not a folder"),
+    ],
+)
+def test_a_daemon_with_a_file_for_a_folder_does_not_run(folder, option, said):
+    ended = fasaco_edge("run", "--state", "s", *option.split())
+    assert ended.code == 78
+    assert said in ended.err
 
 
 def test_a_failing_disk_is_no_configuration_error():

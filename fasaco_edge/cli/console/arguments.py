@@ -246,6 +246,8 @@ def naming(place: Path) -> Iterator[None]:
     """
     try:
         yield
+    except FileExistsError as error:  # of mkdir
+        raise _unwritable(place, f"{error.filename} is not a folder") from error
     except OSError as error:
         raise _unwritable(place, error.strerror or str(error)) from error
 
