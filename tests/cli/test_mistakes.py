@@ -101,7 +101,13 @@ def folder(tmp_path, monkeypatch):
             "good.npy is a coverage grid (.npy), which lies in no",
         ),
         (f"simulate nowhere --connect {NOBODY}", 1, "no map 'nowhere'"),
-        (f"simulate office --speed 0 --connect {NOBODY}", 78, "--speed must be above 0, got 0"),
+        (
+            f"simulate office --speed 0 --connect {NOBODY}",
+            78,
+            "--speed: expected a number of at least 0.01",
+        ),
+        ("simulate office --robot-radius 20", 78, "--robot-radius: expected a number of at most"),
+        ("simulate office --battery-min -1", 78, "--battery-min must be at least 0, got -1"),
         ("rooms set 1", 78, "nothing to set: --passes, --priority, --skip or --no-skip"),
         ("simulate office --map-hz 50", 78, "--map-hz must be 1 to 5, got 50"),
         ("simulate office --range 0", 78, "--range must be above 0 m, got 0"),
@@ -131,7 +137,10 @@ def folder(tmp_path, monkeypatch):
         ),
         ("demo --map nowhere --out o", 1, "no map 'nowhere'"),
         ("follow --speed 0", 78, "--speed must be above 0 and at most 100, got 0"),
-        ("demo --speed 0 --out o", 78, "--speed must be above 0, got 0.0"),
+        ("demo --speed 0 --out o", 78, "--speed: expected a number of at least 0.01"),
+        ("demo --cell 30 --out o", 78, "--cell: expected a number of at most 10, got 30.0"),
+        ("demo --tool-width=30 --out o", 78, "--tool-width: expected a number of at most 10"),
+        ("demo --seed -1 --out o", 78, "--seed: expected a whole number of at least 0, got -1"),
         ("demo --out good.npy", 78, "cannot write good.npy: good.npy is not a folder"),
         ("plan office --passes cross", 78, "--passes[0]: cross goes after a pass with lanes"),
         ("plan office --passes auto@2", 78, "at 2 m/s is faster than the robot, 0.25 m/s"),
@@ -328,10 +337,12 @@ def test_a_demo_reports_that_its_time_is_up(folder):
 
 
 def test_a_demo_whose_daemon_refuses_shows_why(folder):
-    ended = fasaco_edge("demo", "--map", "office", "--cell", 20, "--out", "o")
+    (folder / "o").mkdir()
+    (folder / "o" / "state").touch()
+    ended = fasaco_edge("demo", "--map", "office", "--out", "o")
     assert ended.code == 1
     assert "the daemon ended with 78" in ended.err
-    assert "robot.tool_width_m: expected a number of at most 10, got 20.0" in ended.err
+    assert "cannot keep progress in o/state: o/state is not a folder" in ended.err
 
 
 def test_a_recorder_without_a_folder_is_an_error(folder):
