@@ -190,7 +190,9 @@ def read_passes(text: str) -> tuple[Pass, ...]:
     Raises:
         BadConfiguration: the text is neither.
     """
-    if text.isdecimal() and int(text) <= MOST_PASSES:
+    if text.isdecimal():
+        if float(text) > MOST_PASSES:
+            raise BadConfiguration(f"at most {MOST_PASSES} passes, got {text}")
         return (Pass(),) * int(text)
     return tuple(read_pass(each) for each in text.split(","))
 

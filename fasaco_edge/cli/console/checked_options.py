@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.errors import BadConfiguration, DocumentError
 from fasaco_edge.host.documents import converted
 
 if TYPE_CHECKING:
@@ -48,14 +48,16 @@ def naming_options(args: argparse.Namespace, options: Mapping[str, str]) -> Iter
         options: keys, and the attributes of ``args`` from which their values are.
 
     Raises:
-        BadConfiguration: the block raised it.
+        DocumentError: the block raised it.
     """
     try:
         yield
-    except BadConfiguration as error:
+    except DocumentError as error:
         for fault in (error, *error.rest):
             for key, option in options.items():
                 if fault.key == key or fault.key.startswith((f"{key}.", f"{key}[")):
                     fault.key = args.parser.typed(option)
+                    if fault.hint == type(fault).hint:
+                        fault.advise(BadConfiguration.hint)
                     break
         raise
