@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fasaco_edge.cli.console.arguments import Subcommand, add_robot_on_bus, robot_on_bus
+from fasaco_edge.cli.console.arguments import Subcommand, add_robot_on_bus, fleet_name, robot_on_bus
 from fasaco_edge.cli.console.checked_options import checked_members
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BadConfiguration
@@ -32,6 +32,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--fleet",
+        type=fleet_name,
         metavar="NAME",
         help="record all robots of this fleet (`fleet: {name: NAME}`) into one file, also robots "
         "that join later. Maps and poses come from the native keys, not from ROS 2",

@@ -338,6 +338,14 @@ def test_a_demo_reports_that_its_time_is_up(folder):
     assert "hint: see" in ended.err or "left over" in ended.out or "the time is up" in ended.out
 
 
+@pytest.mark.parametrize("command", ["record --out .", "watch", "mission status"])
+def test_a_fleet_that_no_configuration_names_is_refused(command, capsys):
+    for name, said in (("", "of at least 1 letter"), ("w" * 65, "of at most 64 letters")):
+        with pytest.raises(SystemExit, match="2"):
+            main([*command.split(), "--fleet", name])
+        assert f"--fleet: expected a text {said}" in capsys.readouterr().err
+
+
 def test_a_demo_whose_daemon_refuses_shows_why(folder):
     (folder / "o").mkdir()
     (folder / "o" / "state").touch()

@@ -102,6 +102,16 @@ def pair_of_floats(text: str) -> tuple[float, float]:
     return x, y
 
 
+def fleet_name(text: str) -> str:
+    """Read the name of a fleet, as ``fleet.name`` of a configuration."""
+    from fasaco_edge.config.config import FleetConfig
+    from fasaco_edge.host.documents import inspected
+
+    for fault in inspected(FleetConfig, {"name": text}, BadConfiguration)[1]:
+        raise argparse.ArgumentTypeError(fault.what)
+    return text
+
+
 def seconds(least: float = 0.0, most: float = 3600.0) -> Callable[[str], float]:
     """Return a reader of a time above ``least``, up to ``most`` [s]."""
 

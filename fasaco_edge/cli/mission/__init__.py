@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
-from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_common
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_common, fleet_name
 from fasaco_edge.cli.console.checked_options import naming_options
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
@@ -131,6 +131,7 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     parser.add_argument(
         "--fleet",
+        type=fleet_name,
         metavar="NAME",
         help="command each robot of this fleet (`fleet.name` of its configuration)",
     )
