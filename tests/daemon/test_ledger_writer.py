@@ -55,6 +55,18 @@ def retry_soon(monkeypatch):
     monkeypatch.setattr(disk_writer, "RETRY_S", 0.05)
 
 
+def test_a_folder_that_cannot_be_made_is_reported_at_the_start(tmp_path):
+    folder = tmp_path / "state"
+    folder.write_text("in the way")
+    writer = open_ledger(folder, "robot", CELL_M)
+    assert f"cannot write {folder / 'robot.ledger'}: " in document(writer)["fault"]
+    assert len(writer.disk.take_faults()) == 1
+    folder.unlink()
+    writer.put(lane(1))
+    until(lambda: document(writer)["fault"] is None)
+    writer.disk.close(1.0)
+
+
 def test_a_snapshot_that_is_put_is_written(tmp_path):
     writer = open_ledger(tmp_path, "robot", CELL_M)
     assert writer.restored is None

@@ -74,16 +74,20 @@ class LedgerFile:
         # Whether the new generation is complete, but not yet renamed.
         self._moving = False
 
-    def lock(self) -> None:
+    def lock(self) -> OSError | None:
         """Lock this ledger against other processes until this one ends.
+
+        Returns why it cannot be locked yet, as without a folder: then the first write does it.
 
         Raises:
             LedgerFileError: another process holds the lock.
         """
         self._exclusive = True
-        # Without a folder, the lock is taken before the first write.
-        with contextlib.suppress(OSError):
+        try:
             self._take_lock()
+        except OSError as error:
+            return error
+        return None
 
     def load(self, cell_m: float) -> LoadedLedger:
         """Return the newest complete ledger and any fault; finish an interrupted write."""
