@@ -113,7 +113,7 @@ def run_daemon(
         ledger = open_ledger(folder, config.robot.name, config.cell_m, fresh=fresh)
         if compiler is not None:
             compiler.wait(stop)
-        config.bus.security.warn_of_clock()
+        config.bus.security.warn_of_certificate()
         log_cautions(config)
         settings = config.bus.settings(config.keys().prefix, config.ros2 or None)
         bus = _joined(settings, stop, manager)

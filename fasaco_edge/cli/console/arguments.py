@@ -213,7 +213,7 @@ def _client(name: str, connect: tuple[str, ...], security_file: str | None) -> B
     from fasaco_edge.config.security import read_client_security
 
     security = read_client_security(security_file, connect)
-    security.warn_of_clock()
+    security.warn_of_certificate()
     return BusSettings("client", connect, secured=security.of_client())
 
 
