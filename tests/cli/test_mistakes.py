@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -16,9 +17,11 @@ from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.host.processes import cpu_seconds
+from tests.support.disks import disk_fixture
 from tests.support.forked import run_forked
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge, free_endpoint
 
+full_disk = disk_fixture("64k")
 NOBODY = "tcp/127.0.0.1:1"
 MAP = "{image: map.png, resolution: 0.05, origin: [0, 0, 0], negate: 0}"
 
@@ -379,6 +382,14 @@ def test_a_daemon_with_a_file_for_a_folder_does_not_run(folder, option, said):
     ended = fasaco_edge("run", "--state", "s", *option.split())
     assert ended.code == 78
     assert said in ended.err
+
+
+def test_a_demo_on_a_full_disk_names_its_file(full_disk):
+    with contextlib.suppress(OSError):
+        (full_disk / "ballast").write_bytes(bytes(100_000))
+    ended = fasaco_edge("demo", "--out", str(full_disk))
+    assert ended.code == 1
+    assert f"cannot write {full_disk / 'config.yaml'}: No space left on device" in ended.err
 
 
 def test_a_failing_disk_is_no_configuration_error():

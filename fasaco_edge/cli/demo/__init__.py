@@ -13,6 +13,7 @@ from fasaco_edge.cli.console.arguments import (
     Subcommand,
     add_json,
     naming,
+    seconds,
 )
 from fasaco_edge.cli.console.checked_options import checked_members
 from fasaco_edge.cli.console.terminal import err
@@ -98,7 +99,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, metavar="DIR", help="folder for the results (default: ./runs/<time>)"
     )
     add_json(parser, "the summary")
-    parser.add_argument("--timeout", type=float, default=1800.0, metavar="S", help="time limit [s]")
+    parser.add_argument(
+        "--timeout", type=seconds(most=1e6), default=1800.0, metavar="S", help="time limit [s]"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
