@@ -10,6 +10,7 @@ files without covered cells and swept floor.
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import os
 import re
@@ -77,17 +78,23 @@ class LedgerFile:
     def lock(self) -> OSError | None:
         """Lock this ledger against other processes until this one ends.
 
-        Returns why it cannot be locked yet, as without a folder: then the first write does it.
+        Returns why it cannot be written at present: its folder is missing or read-only. Without a
+        folder the first write locks it.
 
         Raises:
             LedgerFileError: another process holds the lock.
         """
         self._exclusive = True
+        folder = self.path.parent
         try:
             self._take_lock()
+            if os.access(folder, os.W_OK):
+                return None
+            is_read_only = os.statvfs(folder).f_flag & os.ST_RDONLY
         except OSError as error:
             return error
-        return None
+        code = errno.EROFS if is_read_only else errno.EACCES
+        return OSError(code, os.strerror(code))
 
     def load(self, cell_m: float) -> LoadedLedger:
         """Return the newest complete ledger and any fault; finish an interrupted write."""
