@@ -233,6 +233,7 @@ def test_the_command_line_shows_a_certificate(house, tmp_path):
     # Zenoh says no more than that it cannot connect.
     outdated = ask("outdated", house.ca.sign("outdated", days=-1))
     assert "outdated.pem: certificate has expired" in outdated.stderr
+    assert "opens no session: it hangs, is not on a Zenoh bus, or requires" in outdated.stderr
     foreign = authority(tmp_path / "foreign", "boss").files("boss")
     assert "boss.pem: unable to get" in ask("foreign", foreign | {"root_ca": house.ca.root}).stderr
 
