@@ -29,7 +29,7 @@ from fasaco_edge.recording.read.frames import (
     wall_ns,
 )
 from fasaco_edge.recording.read.robot_clock import RobotClock
-from fasaco_edge.recording.read.torn import HINT, open_part
+from fasaco_edge.recording.read.torn import DAMAGED_HINT, open_part
 from fasaco_edge.samples import BatchPlace, SampleDecoder, place_of
 
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
@@ -94,7 +94,7 @@ class RecordedSamples:
             try:
                 samples = decoder.samples(batch.body)
             except MalformedMessage as error:
-                raise UnreadableRecording(f"{batch.path}: {error}", hint=HINT) from error
+                raise UnreadableRecording(f"{batch.path}: {error}", hint=DAMAGED_HINT) from error
             for numbered in samples:
                 # A part repeats the samples in force at its beginning.
                 if numbered.number < following:
