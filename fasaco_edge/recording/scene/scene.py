@@ -19,7 +19,13 @@ from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import OF_PATH, OF_PHEROMONE, OF_RECORDER, OF_STATUS, Curves
 from fasaco_edge.recording.scene.drawings import AreaDrawing, DrivenPathDrawing, PathDrawing
-from fasaco_edge.recording.scene.layers import Anchor, Layers, is_far_from, size_in_file
+from fasaco_edge.recording.scene.layers import (
+    RATES,
+    Anchor,
+    Layers,
+    is_far_from,
+    size_in_file,
+)
 from fasaco_edge.recording.scene.runcard import Outcome, RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
@@ -238,9 +244,12 @@ class Scene:
             return
         self._run = known
         self._describe()
-        radius_m = known_settings(status.config).robot.radius_m
-        if radius_m > 0:
-            self._draw_robot(radius_m)
+        robot = known_settings(status.config).robot
+        # A simulated robot sweeps faster than the recorder's clock runs.
+        scale = max(robot.time_scale, 1.0)
+        self._layers.limit({layer: scale * rate for layer, rate in RATES.items()})
+        if robot.radius_m > 0:
+            self._draw_robot(robot.radius_m)
 
     def _describe(self) -> None:
         card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
