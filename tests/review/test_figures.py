@@ -37,7 +37,7 @@ def shares(drawn, counted):
         )
         for at_s, covered, cells in counted
     ]
-    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, np.zeros(2), ())
+    record = RunRecord((), 0, 0, RobotClock(0), plots, {}, {}, np.zeros(2), ())
     return review_of(record, RunData(statuses=statuses), 0)
 
 

@@ -19,7 +19,7 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.conversion import document_of
 from fasaco_edge.review.floor_and_rooms import swept_floor
-from fasaco_edge.review.instant import instant_at
+from fasaco_edge.review.instant import MapThen, instant_at
 from fasaco_edge.review.output.answers import instant_rows
 from fasaco_edge.review.output.pictures import draw_spots
 from fasaco_edge.review.output.rows import screen_rows
@@ -126,6 +126,8 @@ def test_changes_of_the_map_and_commands_are_listed(review):
     told = dict(instant_rows(instant))
     assert told["order"].startswith("zone a, keep out of")
     assert "seen for the first time" in told["map"]
+    quiet = structs.replace(instant, map=MapThen(3.0, 0.0, 0.0, 0.0, None))
+    assert dict(instant_rows(quiet))["map"] == "no change in the 5 s before"
     assert "facing" in told["robot"]
 
 

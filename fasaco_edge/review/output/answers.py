@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.figures import floor_words
-from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen, direction
+from fasaco_edge.review.instant import MAP_S, Instant, MapThen, PathThen, PlanThen, direction
 from fasaco_edge.review.orders import ordered_words
 from fasaco_edge.review.spot import SWEPT_BY_OTHERS, Spot
 from fasaco_edge.wire.documents.path_documents import Rectangle
@@ -125,7 +125,7 @@ def _map_words(change: MapThen, since: str) -> str:
         if m2
     ]
     if not parts or change.around is None:
-        return f"no change since {since}"
+        return f"no change in the {MAP_S:.0f} s before"
     return f"since {since} {', '.join(parts)}, {_box_words(change.around)}"
 
 

@@ -67,7 +67,7 @@ def draw_map(review: Review) -> Image.Image | None:
         lattice,
         track,
         visits,
-        title=f"{review.record.recording_id}: {DONE[review.complete]}",
+        title=f"{review.record.name}: {DONE[review.complete]}",
         lines=_caption(review),
         driven=driven,
         swept=MapLayer(floor.geometry, floor.swept) if floor and (is_line or others) else None,
@@ -116,7 +116,7 @@ def draw_instant(review: Review, shown: InstantPicture) -> Image.Image | None:
         plot.line(np.array([place, place + HEADING_M * along]), palette.INK, 4.0)
     lines = [*_simulated(review), *(f"{name}: {text}" for name, text in instant_rows(instant))]
     bar = (f"{AROUND_S:.0f} s before", f"{AROUND_S:.0f} s after")
-    title = f"{review.record.recording_id} at {clock(instant.at_s)}"
+    title = f"{review.record.name} at {clock(instant.at_s)}"
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
 
@@ -147,7 +147,7 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
     key.append(KeyEntry("square", palette.END, "asked for"))
     lines = _simulated(review)
     lines += [f"{name}: {text}" for spot in spots for name, text in spot_rows(spot)]
-    title = f"{review.record.recording_id}: one spot"
+    title = f"{review.record.name}: one spot"
     bar = ("0:00", clock(review.duration_s))
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
