@@ -13,6 +13,7 @@ from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
+from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -77,6 +78,9 @@ def test_rooms_are_those_of_the_map(plan, capsys, tmp_path):
     assert all(room["entered"] >= 1 for room in figures["rooms"])
     with Image.open(picture) as image:
         assert image.width > 500
+        key = image.crop((0, image.height - 60, image.width, image.height))
+        colours = {colour for _, colour in key.getcolors(1 << 16)}
+        assert {palette.START, palette.END} <= colours
     assert main(["plan", "flat", "--budget", "0.05", "--rooms"]) == 0
     assert "9.3 m2" in capsys.readouterr().out
 

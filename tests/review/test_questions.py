@@ -21,7 +21,7 @@ from fasaco_edge.review.conversion import document_of
 from fasaco_edge.review.floor_and_rooms import swept_floor
 from fasaco_edge.review.instant import MapThen, instant_at
 from fasaco_edge.review.output.answers import instant_rows
-from fasaco_edge.review.output.pictures import draw_spots
+from fasaco_edge.review.output.pictures import draw_spots, spot_lines
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain
@@ -172,6 +172,9 @@ def test_the_reason_of_an_unswept_spot_is_found(review, place, why, words):
     assert spot.why == why
     assert words in spot.words
     assert spot.swept is (why == "swept")
+    assert spot_lines([spot])[0].startswith("at: ")
+    # In the picture each mark has its number.
+    assert {line.split()[0] for line in spot_lines([spot, spot])} == {"1", "2"}
 
 
 def test_floor_of_a_time_without_poses_is_not_called_missed(review):

@@ -82,6 +82,8 @@ def draw_map(review: Review) -> Image.Image | None:
 # Period before and after a moment for which the driven track is drawn [s].
 AROUND_S = 10.0
 HEADING_M = 0.3
+# Distance of the number of a spot from its mark [m].
+NUMBER_M = 0.2
 
 
 def draw_instant(review: Review, shown: InstantPicture) -> Image.Image | None:
@@ -142,14 +144,24 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
         plot.line(gap, palette.ORANGE, 1.5)
     if gaps:
         key.append(KeyEntry("tile", palette.ORANGE, "no pose in between: does not count"))
-    for spot in spots:
+    for number, spot in enumerate(spots, 1):
         plot.end_mark(np.array([spot.x, spot.y]))
+        if len(spots) > 1:
+            plot.text(str(number), (spot.x + NUMBER_M, spot.y))
     key.append(KeyEntry("square", palette.END, "asked for"))
-    lines = _simulated(review)
-    lines += [f"{name}: {text}" for spot in spots for name, text in spot_rows(spot)]
-    title = f"{review.record.name}: one spot"
+    lines = [*_simulated(review), *spot_lines(spots)]
+    title = f"{review.record.name}: {'one spot' if len(spots) == 1 else f'{len(spots)} spots'}"
     bar = ("0:00", clock(review.duration_s))
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
+
+
+def spot_lines(spots: Sequence[Spot]) -> list[str]:
+    """Return the lines of a caption about spots; several have the numbers of their marks."""
+    return [
+        f"{f'{number} ' * (len(spots) > 1)}{name}: {text}"
+        for number, spot in enumerate(spots, 1)
+        for name, text in spot_rows(spot)
+    ]
 
 
 def _simulated(review: Review) -> list[str]:
