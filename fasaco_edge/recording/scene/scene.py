@@ -244,12 +244,11 @@ class Scene:
             return
         self._run = known
         self._describe()
-        robot = known_settings(status.config).robot
+        settings = known_settings(status.config)
         # A simulated robot sweeps faster than the recorder's clock runs.
-        scale = max(robot.time_scale, 1.0)
-        self._layers.limit({layer: scale * rate for layer, rate in RATES.items()})
-        if robot.radius_m > 0:
-            self._draw_robot(robot.radius_m)
+        self._layers.limit({layer: settings.pace * rate for layer, rate in RATES.items()})
+        if settings.robot.radius_m > 0:
+            self._draw_robot(settings.robot.radius_m)
 
     def _describe(self) -> None:
         card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
