@@ -115,6 +115,16 @@ def test_a_turn_of_the_robot_is_explained(review):
     assert instant.path.changed.x_max == 2.0
 
 
+def test_a_stretch_sweeps_new_floor_or_is_a_way(review):
+    first = instant_at(review, review.data.pose_s[0]).instant
+    assert 0.0 < first.sweeps_new_m2 < first.sweeps_m2
+    words = dict(instant_rows(first))["sweeps"]
+    assert words.endswith(f" of {first.sweeps_m2:.2f} m2 for the first time, in the next 10 s")
+    # Back on the line along which it came.
+    back = instant_at(review, turned_s(review)).instant
+    assert back.sweeps_new_m2 == 0.0 < back.sweeps_m2
+
+
 def test_changes_of_the_map_and_commands_are_listed(review):
     instant = instant_at(review, turned_s(review)).instant
     # A band of 40 cm across the room, of which the box and two walls are no floor.
