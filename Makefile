@@ -24,7 +24,8 @@ test: $(STAMP)  ## all tests
 	$(BIN)/fasaco-edge warmup; code=$$?; wait; exit $$code
 	# In the order of collection: by default files with few tests, which take longest, would come
 	# last. What a busy machine held up for too long runs once more; the closing line counts that.
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --reruns 1 -rR $(ARGS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --reruns 1 \
+		--rerun-show-tracebacks $(ARGS)
 
 quick: check  ## check, and the tests that import what has changed since the last commit: a minute or so
 	files=$$($(BIN)/python -m tests.quick) && if [ -n "$$files" ]; then \

@@ -20,16 +20,27 @@ ROOT = Path(__file__).parents[1]
 WINGS = ("bench", "fleet", "follow", "replay", "review", "serve", "watch")
 
 
+# Runs several commands, one after the other, in one process: each would import the same again.
+COMMANDS = """
+import contextlib, json, sys
+from fasaco_edge.cli import main
+for words in json.loads(sys.argv[1]):
+    with contextlib.suppress(SystemExit):  # as after each --help
+        assert main(words) == 0, words
+"""
+
+
 def without(folder, *wings):
-    """Copy the package without some of its folders; return what runs its command."""
+    """Copy the package without some of its folders; return what runs commands of it."""
     for name in ("fasaco_edge", "maps", "protocol", "deploy"):
         shutil.copytree(ROOT / name, folder / name)
     shutil.copy(ROOT / "pyproject.toml", folder)
     for wing in wings:
         shutil.rmtree(folder / "fasaco_edge" / wing)
 
-    def run(*words):
-        command = [sys.executable, "-m", "fasaco_edge", *map(str, words)]
+    def run(*commands):
+        words = json.dumps([list(map(str, command)) for command in commands])
+        command = [sys.executable, "-c", COMMANDS, words]
         environment = os.environ | {"PYTHONPATH": str(folder)}
         ended = subprocess.run(
             command, env=environment, cwd=folder, capture_output=True, text=True, check=False
@@ -53,16 +64,18 @@ def small_room(tmp_path):
 @pytest.mark.parametrize("wing", WINGS)
 def test_commands_need_no_wing(wing, tmp_path, small_room):
     run = without(tmp_path / "tree", wing)
-    assert json.loads(run("plan", small_room, "--json"))["cells"] > 0
-    assert "in order" in run("check-config", ROOT / "deploy" / "fasaco-edge.yaml")
-    for command in ("run", "record", "demo"):
-        assert "usage" in run(command, "--help")
+    helps = [(command, "--help") for command in ("run", "record", "demo")]
+    check = "check-config", ROOT / "deploy" / "fasaco-edge.yaml"
+    said = run(*helps, check, ("plan", small_room, "--json"))
+    assert said.count("usage:") == len(helps)
+    assert "in order" in said
+    assert json.loads(said[said.index("\n{") :])["cells"] > 0
 
 
 def test_a_recorded_mission_needs_no_wing(tmp_path, small_room):
     pytest.importorskip("rerun")
     run = without(tmp_path / "tree", *WINGS)
     out = tmp_path / "demo"
-    told = json.loads(run("demo", "--map", small_room, "--speed", 60, "--out", out, "--json"))
+    told = json.loads(run(("demo", "--map", small_room, "--speed", 60, "--out", out, "--json")))
     assert told["complete"]
     assert list(out.glob("*.rrd"))

@@ -5,7 +5,8 @@ session has ended. So a map, pose or mask does not alternate between publishers,
 program is accepted again.
 
 A publisher is identified by the Zenoh id of its session, see ``arrival.Sample.sender``. A sample of
-unknown origin always counts; two publishers of such maps are noticed, as their maps alternate.
+unknown origin always counts, but two publishers of such maps are noticed, as their maps alternate:
+then the maps of one do not count.
 """
 
 from __future__ import annotations
@@ -107,25 +108,31 @@ _Seen = tuple[tuple[object, ...], int]
 
 
 class ReturningMaps:
-    """Detects maps that alternate."""
+    """Detects maps that alternate, and keeps to one of the two while that one still arrives."""
 
     def __init__(self) -> None:
+        self._last_at = float("-inf")
         self._last: _Seen | None = None
         self._before: _Seen | None = None
         self._returned = deque[float](maxlen=RETURNS)
 
-    def note(self, grid: OccupancyGrid, now: float) -> None:
-        """Note a map that arrived at ``now`` [s, monotonic]."""
+    def takes(self, grid: OccupancyGrid, now: float) -> bool:
+        """Note a map that arrived at ``now`` [s, monotonic]; return whether it counts."""
         pixels = grid.cells.tobytes()
         seen = (grid.frame, grid.geometry, zlib.crc32(pixels)), pixels.count(0)
         last, before = self._last, self._before
         if last is None or seen == last:
-            self._last = seen
-            return
+            self._last, self._last_at = seen, now
+            return True
         is_large = abs(seen[1] - last[1]) * grid.geometry.resolution >= LEAST_WALL_M
         if seen == before and (is_large or seen[0][1] != last[0][1]):
             self._returned.append(now)
-        self._before, self._last = last, seen
+            # Maps of two frames both count: the mission chooses the frame.
+            is_same_frame = seen[0][0] == last[0][0]
+            if is_same_frame and self.conflict(now) and now - self._last_at <= PERIOD_S:
+                return False
+        self._before, self._last, self._last_at = last, seen, now
+        return True
 
     def conflict(self, now: float) -> str:
         """Return the text of a conflict; "" for none."""

@@ -31,7 +31,7 @@ from fasaco_edge.bus.queries import (
     send,
     size_of,
 )
-from fasaco_edge.bus.settings import BusSettings, first_line, session_config
+from fasaco_edge.bus.settings import BusSettings, session_config, unavailable
 from fasaco_edge.bus.stand_in import StandIn
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import Keys
@@ -318,13 +318,13 @@ def open_bus(settings: BusSettings) -> Bus:
         # A secured session connects only to endpoints configured in ``connect``.
         taken = settings.listen and "Address already in use" in str(error)
         if not taken or settings.secured:
-            raise BusUnavailable(first_line(error)) from error
+            raise unavailable(error, settings.connect) from error
     # Another process listens there: connect to it as a client.
     joined = replace(settings, mode="client", connect=settings.connect + settings.listen, listen=())
     try:
         session = zenoh.open(session_config(joined))
     except zenoh.ZError as error:
-        raise BusUnavailable(first_line(error)) from error
+        raise unavailable(error, joined.connect) from error
     return Bus(session, stand_in=StandIn(session_config(settings)))
 
 

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+import socket
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 
 # Timeout of the handshake of an incoming connection [ms]; largest number of pending handshakes.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
+# Beginning of the message that no endpoint was reached.
+NO_CONNECTION = "cannot connect to "
+# Timeout of a connection that shows whether a program listens at an endpoint [s].
+PROBE_S = 1.0
 # Length of the queues [packets of 64 kB]. A map or a path has many packets, and with Zenoh's
 # default of two it is lost if the computer is busy for 50 ms. These queues take a megabyte, only
 # while needed.
@@ -120,4 +125,33 @@ def first_line(error: Exception) -> str:
     said = str(error).partition(" at /")[0].strip()
     if (match := re.fullmatch(r"Unable to connect to any of \[(.*)\]!", said)) is None:
         return said
-    return "cannot connect to " + re.sub(r"Single\((.*?)\)", r"\1", match[1])
+    return NO_CONNECTION + re.sub(r"Single\((.*?)\)", r"\1", match[1])
+
+
+def unavailable(error: Exception, endpoints: Iterable[str]) -> BusUnavailable:
+    """Return the error of a session that cannot be opened with Zenoh's ``error``.
+
+    Zenoh says the same whether nothing listens or a program there opens no session.
+    """
+    said = first_line(error)
+    for endpoint in endpoints if said.startswith(NO_CONNECTION) else ():
+        if _is_accepted(endpoint):
+            return BusUnavailable(
+                said,
+                hint=f"a program listens at {endpoint}, but opens no session: it hangs, is not on "
+                "a Zenoh bus, or requires other credentials (bus.security, --security)",
+            )
+    return BusUnavailable(said)
+
+
+def _is_accepted(endpoint: str) -> bool:
+    """Return whether a TCP connection to an endpoint is accepted."""
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = re.split("[?#]", address)[0].rpartition(":")
+    if protocol not in ("tcp", "tls", "ws") or not port.isdecimal():
+        return False
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), PROBE_S).close()
+    except (OSError, UnicodeError, OverflowError):
+        return False
+    return True

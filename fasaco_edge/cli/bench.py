@@ -161,7 +161,7 @@ def _goals(report: Report) -> Table:
         False: Text("missed", "red"),
         None: "not measured",
     }
-    table = _table("goals")
+    table = _table("goals of the default options")
     for column in ("", "measured", "goal", ""):
         table.add_column(column, justify="left" if column == "" else "right")
     for goal in report.goals:

@@ -19,6 +19,7 @@ from fasaco_edge.cli.console.arguments import (
     seconds,
     writing,
 )
+from fasaco_edge.cli.console.checked_options import given_members, naming_options
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import err, out, say
 from fasaco_edge.errors import BadConfiguration
@@ -34,13 +35,19 @@ WAYS = {
     "rmw_zenoh": "ROS 2 whose middleware is rmw_zenoh",
     "bridge": "ROS 2 behind zenoh-bridge-ros2dds",
 }
-# Keys of the section ``robot``, and the options that set them.
+# Options, and the members of the section ``robot`` that they set.
 ROBOT = {
     "name": "name",
-    "radius_m": "robot_radius",
-    "footprint": "robot_size",
-    "clearance_m": "clearance",
-    "tool_width_m": "tool_width",
+    "robot_radius": "radius_m",
+    "robot_size": "footprint",
+    "clearance": "clearance_m",
+    "tool_width": "tool_width_m",
+}
+# Keys of the configuration, and the options that set them.
+OPTIONS = {f"robot.{member}": option for option, member in ROBOT.items()} | {
+    "bus.connect": "connect",
+    "ros2.domain": "domain",
+    "ros2.namespace": "namespace",
 }
 # Options that are asked for if missing, each with its question and default answer.
 QUESTIONS = {
@@ -162,7 +169,8 @@ def run(args: argparse.Namespace) -> int:
     _ask(args)
     document = document_of(args)
     text = HEAD + (dump(document) if document else "")
-    config = _checked(document)
+    with naming_options(args, OPTIONS):
+        config = _checked(document)
     with writing(file) as new:
         new.write_text(text, encoding="utf-8")
     found = None if args.no_try else _listen(config, args.listen)
@@ -182,7 +190,7 @@ def document_of(args: argparse.Namespace) -> dict[str, object]:
     parts: dict[str, dict[str, object]] = {
         "robot": {
             k: v
-            for k, v in _robot(args).items()
+            for k, v in given_members(args, ROBOT).items()
             if k in ("radius_m", "tool_width_m") or v != getattr(usual, k)
         },
         "bus": {},
@@ -196,12 +204,6 @@ def document_of(args: argparse.Namespace) -> dict[str, object]:
     elif args.domain is not None or args.namespace is not None:
         raise BadConfiguration("--domain and --namespace are for maps from ROS 2, see --map-by")
     return {name: part for name, part in parts.items() if part}
-
-
-def _robot(args: argparse.Namespace) -> dict[str, object]:
-    """Return the settings of the robot that options or answers give."""
-    given = {key: getattr(args, option) for key, option in ROBOT.items()}
-    return {key: value for key, value in given.items() if value is not None}
 
 
 def _ask(args: argparse.Namespace) -> None:
@@ -220,7 +222,8 @@ def _ask(args: argparse.Namespace) -> None:
         raise BadConfiguration(
             f"{', '.join(names)} must be given: there is no terminal for questions"
         )
-    _checked({"robot": _robot(args)})
+    with naming_options(args, OPTIONS):
+        _checked({"robot": given_members(args, ROBOT)})
     for name in missing:
         setattr(args, name, _asked(name))
 
@@ -238,7 +241,7 @@ def _asked(name: str) -> object:
             return _read(name, line.strip() or default)
         except BadConfiguration as error:
             more = "" if error.hint == BadConfiguration.hint else f" ({error.hint})"
-            say(err(), f"{error}{more}", "  ", "  ")
+            say(err(), f"{error.what}{more}", "  ", "  ")
 
 
 def _read(name: str, text: str) -> object:
@@ -256,8 +259,7 @@ def _read(name: str, text: str) -> object:
         value = _number(text)
     except argparse.ArgumentTypeError as error:
         raise BadConfiguration(str(error)) from None
-    key = next(key for key, option in ROBOT.items() if option == name)
-    _checked({"robot": {key: value}})
+    _checked({"robot": {ROBOT[name]: value}})
     return value
 
 

@@ -126,9 +126,11 @@ def _warn(request: RequestedPlan, planned: Plan | PassPlans) -> None:
         return
     if asked_share is not None and floor.swept_share < asked_share:
         LOG.warning(
-            "--swept %g: the line sweeps %.4f; a larger --budget may find one that sweeps more",
+            "--swept %g: the line sweeps %.4f, and leaves %.2f m2; a larger --budget may find one "
+            "that sweeps more, unless no line gets at the rest",
             asked_share,
             floor.swept_share,
+            floor.reachable_m2 - floor.swept_m2,
         )
     if left := floor.spot_turns:
         LOG.warning(

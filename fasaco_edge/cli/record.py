@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fasaco_edge.cli.console.arguments import Subcommand, add_robot_on_bus, robot_on_bus
+from fasaco_edge.cli.console.arguments import Subcommand, add_robot_on_bus, fleet_name, robot_on_bus
+from fasaco_edge.cli.console.checked_options import checked_members
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.host.documents import converted, inspected
+from fasaco_edge.host.documents import converted
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.settings import BusSettings
@@ -31,6 +32,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--fleet",
+        type=fleet_name,
         metavar="NAME",
         help="record all robots of this fleet (`fleet: {name: NAME}`) into one file, also robots "
         "that join later. Maps and poses come from the native keys, not from ROS 2",
@@ -108,14 +110,11 @@ def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettin
     from fasaco_edge.config.security import BusConfig
 
     keys, bus, _ = robot_on_bus(args)
-    limits = {"quota_mb": args.quota_mb}
-    recording, faults = inspected(RecordingConfig, limits, BadConfiguration)
-    for fault in faults:
-        raise BadConfiguration(fault.what, key="--quota-mb")
+    limits = checked_members(RecordingConfig, args, {"quota_mb": "quota_mb"})
     config = DaemonConfig(
         robot=RobotConfig(name=keys.robot),
         bus=BusConfig(base=keys.base),
-        recording=recording,
+        recording=RecordingConfig(**limits),
         ros2=args.ros2 or msgspec.UNSET,
     )
     return config, bus

@@ -22,6 +22,7 @@ from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.replay.cycle_replay import CycleReplay, Difference, read_turns
 from fasaco_edge.replay.replay import PROPOSALS, Replay, read_run
 from fasaco_edge.wire.documents.path_documents import PlanFigures, digest
+from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.events import PathUpdate
@@ -213,7 +214,7 @@ def _table(steps: Sequence[ReplayStep]) -> Table:
             ]
         if update or step.changed or faults:
             table.add_row(
-                clock(step.at_s), step.state, *row, "; ".join(filter(None, (why, *faults)))
+                clock(step.at_s), step.state, *row, "; ".join(filter(None, (plain(why), *faults)))
             )
     return table
 
@@ -221,7 +222,7 @@ def _table(steps: Sequence[ReplayStep]) -> Table:
 def _rows(summary: ReplaySummary) -> list[tuple[str, str]]:
     faults = ", ".join(f"{count} {code}" for code, count in summary.faults.items())
     rows = [
-        ("ended", f"{summary.state}: {summary.reason}"),
+        ("ended", f"{summary.state}: {plain(summary.reason)}"),
         ("covered", f"{summary.covered_cells} of {summary.coverable_cells} cells"),
         ("plans, paths", f"{summary.plans}, {summary.paths}"),
         ("refused", faults or "nothing"),

@@ -6,6 +6,7 @@ import argparse
 
 from fasaco_edge.cli.ask import add_question, ask, show_rooms
 from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_common, pair_of_floats
+from fasaco_edge.cli.console.checked_options import naming_options
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
@@ -118,7 +119,8 @@ def run(args: argparse.Namespace) -> int:
     """List the rooms, or send a command that changes them."""
     if args.rooms_action != "list":
         asked = _asked(args)
-        read_command(asked)  # faults are reported without a daemon
+        with naming_options(args, {"room.passes": "passes", "room.priority": "priority"}):
+            read_command(asked)  # faults are reported without a daemon
         reply = ask(args, "mission", payload=encode_json(asked))
         if args.json:
             print_json(decode_json(reply.payload))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 
 from fasaco_edge.cli.console.arguments import (
@@ -17,6 +19,7 @@ from fasaco_edge.cli.console.arguments import (
     robot_on_bus,
     writing,
 )
+from fasaco_edge.cli.console.checked_options import checked_members
 from fasaco_edge.cli.console.terminal import ProgressLines, out, say
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import Pose2D
@@ -26,6 +29,13 @@ from fasaco_edge.text import percent
 if TYPE_CHECKING:
     from fasaco_edge.simulation.node import Progress
     from fasaco_edge.simulation.world import World
+
+# Options, and the members of ``RobotConfig`` that they set.
+ROBOT_OPTIONS = {
+    "speed": "time_scale",
+    "robot_radius": "radius_m",
+    "turn_radius": "turn_radius_m",
+}
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -99,14 +109,15 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([args.trail_out], map_sources(path))
     here = robot_on_bus(args)
     robot = RobotConfig() if here.config is None else here.config.robot
+    robot = msgspec.structs.replace(robot, **checked_members(RobotConfig, args, ROBOT_OPTIONS))
     if not 1.0 <= args.map_hz <= 5.0:
         raise BadConfiguration(f"--map-hz must be 1 to 5, got {args.map_hz:g}")
-    if not args.range > 0.0:
+    if not 0.0 < args.range < math.inf:
         raise BadConfiguration(f"--range must be above 0 m, got {args.range:g}")
-    if args.speed is not None and not args.speed > 0.0:
-        raise BadConfiguration(f"--speed must be above 0, got {args.speed:g}")
+    if not 0.0 <= args.battery_min < math.inf:
+        raise BadConfiguration(f"--battery-min must be at least 0, got {args.battery_min:g}")
     config = SimulationConfig(
-        robot_radius_m=robot.radius_m if args.robot_radius is None else args.robot_radius,
+        robot_radius_m=robot.radius_m,
         speed_m_s=robot.speed_m_s,
         range_m=args.range,
         map_hz=args.map_hz,
@@ -124,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
             world,
             here.keys,
             here.bus,
-            speed=robot.time_scale if args.speed is None else args.speed,
+            speed=robot.time_scale,
             driver=args.driver,
             meets_others=args.meets_others,
             waits=True,

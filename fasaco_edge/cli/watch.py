@@ -12,6 +12,7 @@ from fasaco_edge.cli.console.arguments import (
     Exit,
     Subcommand,
     add_robot_on_bus,
+    fleet_name,
     robot_on_bus,
     seconds,
 )
@@ -58,6 +59,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--fleet",
+        type=fleet_name,
         metavar="NAME",
         help="show all robots of this fleet (`fleet: {name: NAME}`) in place of one robot",
     )

@@ -302,7 +302,10 @@ class DaemonConfig(StrictDocument, frozen=True):
         yield from faults_of(lambda: Keys(robot=self.robot.name), key="robot.name")
         others = ("robot.tool_width_m", "robot.quarter_turn_s", "robot.turn_deg_s")
         for error in faults_of(self.robot.cost):
-            yield BadConfiguration(error.said, key="robot.speed_m_s", others=others)
+            if error.key == "cell_m":
+                yield BadConfiguration(error.what, key="robot.tool_width_m")
+            else:
+                yield BadConfiguration(error.said, key="robot.speed_m_s", others=others)
         if self.bus.security.roles.ros and not self.ros2:
             text = "without a block ros2 there is no such role"
             yield BadConfiguration(text, key="bus.security.roles.ros", others=["ros2"])

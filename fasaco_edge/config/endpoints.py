@@ -100,8 +100,9 @@ def _why_no_socket(address: str) -> str:
         return "a space in the address"
     if not host:
         return "the address must be <host>:<port>"
-    if not re.fullmatch(r"[0-9]{1,5}", port) or int(port) >= 1 << 16:
-        return f"the port must be a number of at most 65535, got {port!r}"
+    # A system chooses a port for 0, which no other program knows.
+    if not re.fullmatch(r"[0-9]{1,5}", port) or not 0 < int(port) < 1 << 16:
+        return f"the port must be a number from 1 to 65535, got {port!r}"
     if ":" in host and not (host.startswith("[") and host.endswith("]")):
         return f"an IPv6 address stands in brackets, as [{host}]:{port}"
     return ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -15,7 +14,7 @@ from fasaco_edge.bus import DEFAULT_ENDPOINT, access
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.endpoints import UNIX, endpoint_faults, from_here, is_local, protocol_of
 from fasaco_edge.config.reading import faults_of
-from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
+from fasaco_edge.errors import BadConfiguration, FasacoError, OpenToEveryone
 from fasaco_edge.host.documents import StrictDocument, inspected
 from fasaco_edge.host.plain_yaml import read_bounded, read_written
 from fasaco_edge.wire.keys import Keys
@@ -84,26 +83,17 @@ class SecurityConfig(StrictDocument, frozen=True):
         """Return the names with each role."""
         return structs.asdict(self.roles)
 
-    def warn_of_clock(self) -> None:
-        """Warn if the clock is before the certificate's start, so that no connection can be made.
+    def warn_of_certificate(self) -> None:
+        """Warn of a certificate with which no connection can be made: Zenoh does not say why."""
+        if self.kind != "tls" or not all(os.path.isfile(path) for _, path in files(self)):
+            return  # opening the session raises an error that names the file
+        # Imports ssl, which a session without certificates does not need.
+        from fasaco_edge.config.certificates import read_certificate  # noqa: PLC0415
 
-        Certificates are read, which takes memory and time, only if the clock is before the time at
-        which one of their files, or this program, was written.
-        """
-        if self.kind != "tls":
-            return
         try:
-            written = [os.stat(path).st_mtime for _, path in files(self)]
-            if time.time() >= max(*written, Path(__file__).stat().st_mtime):
-                return
-            # Imports ssl, which a daemon with a correct clock does not need.
-            from fasaco_edge.config.certificates import read_certificate  # noqa: PLC0415
-
-            read_certificate(self.tls)
-        except ClockBeforeCertificate as error:
-            LOG.warning("%s; %s", error, error.hint, extra={"event": "clock"})
-        except (OSError, BadConfiguration):
-            return  # opening the session raises this error
+            read_certificate(self.tls, listens=False)
+        except FasacoError as error:
+            LOG.warning("%s; %s", error, error.hint, extra={"event": "certificate"})
 
     def of_client(self, dictionary_file: str = "") -> dict[str, Any]:
         """Return the credentials of a session, as a part of Zenoh's configuration.
@@ -212,7 +202,7 @@ class BusConfig(StrictDocument, frozen=True):
         Raises:
             BadConfiguration: a file of ``security`` cannot be read.
         """
-        self.security.warn_of_clock()
+        self.security.warn_of_certificate()
         endpoints = tuple(map(from_here, self.listen or self.connect))
         return BusSettings("client", endpoints, secured=self.security.of_client())
 

@@ -30,6 +30,8 @@ from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.durable import file_in_place_of
 from fasaco_edge.host.processes import (
     call_on,
     end_within,
@@ -80,7 +82,8 @@ def run_daemon(
     Raises:
         BusUnavailable: no session could be opened.
         LedgerFileError: another process writes this robot's ledger.
-        BadConfiguration: there is no folder for the ledger, or a file of bus.security is missing.
+        BadConfiguration: there is no folder for the ledger, a file lies in place of a folder, or a
+            file of bus.security is missing.
         ProcessEnded: a service's kernels could not be compiled.
     """
     started = time.monotonic()
@@ -104,10 +107,13 @@ def run_daemon(
     compiler = KernelCompiler(manager) if manager.is_present else None
     try:
         folder = state or config.mission.state_folder()
+        _check_folder("keep progress in", folder)
+        if record_to is not None:
+            _check_folder("record into", record_to)
         ledger = open_ledger(folder, config.robot.name, config.cell_m, fresh=fresh)
         if compiler is not None:
             compiler.wait(stop)
-        config.bus.security.warn_of_clock()
+        config.bus.security.warn_of_certificate()
         log_cautions(config)
         settings = config.bus.settings(config.keys().prefix, config.ros2 or None)
         bus = _joined(settings, stop, manager)
@@ -120,6 +126,16 @@ def run_daemon(
         if compiler is not None:
             compiler.close()
     LOG.info("stopped", extra={"event": "stopped"})
+
+
+def _check_folder(purpose: str, folder: Path) -> None:
+    """Check that no file lies in place of a folder: waiting does not mend that.
+
+    Raises:
+        BadConfiguration: one does.
+    """
+    if (file := file_in_place_of(folder)) is not None:
+        raise BadConfiguration(f"cannot {purpose} {folder}: {file} is not a folder")
 
 
 def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManager) -> Bus | None:

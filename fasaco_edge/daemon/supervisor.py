@@ -35,7 +35,10 @@ WORKS_S = 0.01
 
 
 class RecorderSupervisor:
-    """Starts ``fasaco-edge record``, and starts it again when it dies or hangs."""
+    """Starts ``fasaco-edge record``, and starts it again when it dies or hangs.
+
+    A recorder whose configuration is wrong (``EX_CONFIG``) is not started again.
+    """
 
     def __init__(self, config: DaemonConfig, bus: Bus, folder: Path) -> None:
         self._config = msgspec.json.encode(config)
@@ -59,6 +62,8 @@ class RecorderSupervisor:
         code = self._process.poll() if self._process is not None else None
         if self._process is not None and code is None:
             return self._running(now)
+        if code == os.EX_CONFIG:
+            return self._failed()
         if self._start_at is None:
             if code is not None:
                 self._death = f"died by signal {-code}" if code < 0 else f"exited with {code}"
@@ -71,6 +76,14 @@ class RecorderSupervisor:
             self._report, self._began_at, self._reported_at = None, now, now
             self._launch()
         return SupervisedRecorder("restarting", self._restarts, self._death)
+
+    def _failed(self) -> SupervisedRecorder:
+        """Return the state of a recorder whose folder or configuration is wrong."""
+        reason = "its folder or configuration is wrong, see the log"
+        if self._death != reason:
+            self._death = reason
+            LOG.error("recorder exited with %d: it is not started again", os.EX_CONFIG)
+        return SupervisedRecorder("failed", self._restarts, reason)
 
     def _launch(self) -> None:
         """Start the process; this may fail without memory or process ids."""

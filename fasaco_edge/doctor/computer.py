@@ -17,6 +17,7 @@ from pathlib import Path
 from fasaco_edge.daemon.ledger.file import lock_file, why_no_lock
 from fasaco_edge.daemon.memory import has_default_sizes, limited_to_memory, limits_mib
 from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, warn, worst
+from fasaco_edge.host.durable import file_in_place_of
 from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.kernels.folder import outdated, wanted_folder
 from fasaco_edge.kernels.manifest import why_missing
@@ -183,6 +184,8 @@ def _folders(context: CheckContext) -> dict[str, Path]:
 
 
 def _space(name: str, folder: Path, least_mb: float) -> Finding:
+    if (file := file_in_place_of(folder)) is not None:
+        return fail(f"{name}: {folder}: {file} is not a folder", "name another folder")
     try:
         there = folder
         while not there.exists():

@@ -146,10 +146,11 @@ def draw_walk(
     if rooms is not None:
         paint_rooms(plot, rooms)
     left = draw_floor(plot, unswept, *UNSWEPT)
-    key: list[KeyEntry] = []
-    if rooms is None and swept is not None:
+    if rooms is not None:
+        key = [*ENDS]
+    elif swept is not None:
         key = [*ENDS, *draw_floor(plot, swept, palette.COVERED, "floor swept")]
-    elif rooms is None:
+    else:
         key = draw_visits(plot, lattice, visits_of(lattice, cells), tuple(cells[0].tolist()))
     key += draw_driven(plot, driven, is_backward, lattice.cell_m) + left
     if rooms is not None:

@@ -163,7 +163,7 @@ def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Win
     # A negated comparison, so that NaN is caught too.
     if not rows * cols <= max_cells:
         raise MapTooLarge(
-            f"a lattice of {rows:.0f} x {cols:.0f} cells of {cell_m} m over a map of "
+            f"a lattice of {rows:.6g} x {cols:.6g} cells of {cell_m} m over a map of "
             f"{x1 - x0:.0f} x {y1 - y0:.0f} m exceeds {max_cells} cells",
             hint="check the map's resolution; larger cells or map.max_lattice_cells may help",
         )

@@ -38,6 +38,12 @@ def make_folder(folder: Path, *, mode: int = 0o777) -> None:
     sync_folder(folder.parent)
 
 
+def file_in_place_of(folder: Path) -> Path | None:
+    """Return what lies in place of a folder, or of one of its parents; None if it can be made."""
+    found = next((each for each in (folder, *folder.parents) if os.path.exists(each)), None)
+    return None if found is None or os.path.isdir(found) else found
+
+
 def sync_folder(folder: Path) -> None:
     """Write the names in a folder to the disk; OSError if that fails."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)

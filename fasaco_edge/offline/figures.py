@@ -116,10 +116,10 @@ def curve_document(robot: RobotConfig, curve: Curve, judged: FloorFigures) -> di
 def curve_words(robot: RobotConfig, curve: Curve, judged: FloorFigures) -> str:
     """Return a robot's curve as text."""
     changes = "1 change" if judged.reversals == 1 else f"{judged.reversals} changes"
-    words = (
-        f"arcs of {robot.turn_radius_m:g} m or more, {judged.length_m:,.1f} m in "
-        f"{judged.seconds:,.0f} s, {curve.backward_m:,.1f} m of it backward, {changes} between "
-        "forward and backward"
+    words = f"arcs of {robot.turn_radius_m:g} m or more, " + (
+        f"{curve.backward_m:,.1f} m backward, {changes} between forward and backward"
+        if robot.reverses
+        else "forward only"
     )
     if left := judged.spot_turns:
         words += f"; {left} turn{'s' * (left != 1)} do{'es' * (left == 1)} not fit"

@@ -153,8 +153,10 @@ def plan_passes(
             "several passes are only planned for a robot that turns on the spot",
             hint="plan each pass separately; a mission drives one after the other",
         )
-    if isinstance(passes, str):
-        raise BadConfiguration(f"passes must be a list such as [{passes!r}], got {passes!r}")
+    is_list = isinstance(passes, Sequence) and not isinstance(passes, str) and len(passes) > 0
+    if not is_list or not all(isinstance(each, str | Pass) for each in passes):
+        such = passes.split(",") if passes and isinstance(passes, str) else ["edge", "auto"]
+        raise BadConfiguration(f"passes must be a list such as {such}, got {passes!r}")
     asked = tuple(read_pass(each) if isinstance(each, str) else each for each in passes)
     plans: list[Plan] = []
     for index, (each, lay) in enumerate(zip(asked, laid(asked), strict=True)):

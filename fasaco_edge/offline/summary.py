@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from fasaco_edge.offline.passes import PassPlans
     from fasaco_edge.offline.result import Drive, Plan
 
+# Ratio of a search's duration and its budget above which a reader wonders.
+LATE = 1.5
+
 Rows = list[tuple[str, str]]
 
 
@@ -36,8 +39,15 @@ def rows_of(plan: Plan) -> Rows:
     rows.append(("walk", walk + above_bound(path)))
     if count := int(plan.problem.unreachable.sum()):
         rows.append(("not reached", f"{count} cells that no walk from the start leads to"))
-    rows.append(("search", f"{plan.wall_s:.1f} s, ended by {plan.ended_by}"))
+    rows.append(("search", _search_words(plan)))
     return rows
+
+
+def _search_words(plan: Plan) -> str:
+    budget_s = plan.search.most_s
+    if plan.ended_by == "budget" and budget_s is not None and plan.wall_s > LATE * budget_s:
+        return f"{plan.wall_s:.1f} s: the first line took longer than the budget of {budget_s:g} s"
+    return f"{plan.wall_s:.1f} s, ended by {plan.ended_by}"
 
 
 def rows_of_passes(plans: PassPlans) -> Rows:

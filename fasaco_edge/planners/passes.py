@@ -167,16 +167,19 @@ def read_pass(text: str) -> Pass:
     lanes = "auto" if what == covers else lanes
     angle_deg = None if lanes in get_args(Direction) else _number(lanes.removesuffix("deg"))
     speed_m_s = _number(speed) if at else None
-    is_angle = angle_deg is None or (lanes.endswith("deg") and abs(angle_deg) <= MOST_ANGLE_DEG)
-    is_speed = speed_m_s is None or 0.0 < speed_m_s <= 10.0
     overlap = _number(overlap_text) / 100.0 if percent else None
-    is_overlap = overlap is None or 0.0 <= overlap <= MOST_OVERLAP
-    if not (is_angle and is_speed and is_overlap):
+    is_angle = angle_deg is None or lanes.endswith("deg")
+    if not is_angle or any(map(math.isnan, (angle_deg or 0.0, speed_m_s or 0.0, overlap or 0.0))):
         raise BadConfiguration(
-            f"a pass is edge, rest, auto, cross, rest:cross, or an angle such as 30deg, up to "
-            f"{MOST_ANGLE_DEG:g}; then %30 for an overlap, up to {100 * MOST_OVERLAP:g} percent, "
-            f"and @0.15 for a speed, up to 10 m/s; got {text!r}"
+            "a pass is edge, rest, auto, cross, rest:cross, or an angle such as 30deg, then %30 "
+            f"for an overlap and @0.15 for a speed; got {text!r}"
         )
+    if abs(angle_deg or 0.0) > MOST_ANGLE_DEG:
+        raise BadConfiguration(f"an angle is up to {MOST_ANGLE_DEG} deg, got {text!r}")
+    if speed_m_s is not None and not 0.0 < speed_m_s <= 10:
+        raise BadConfiguration(f"a speed is above 0 and at most 10 m/s, got {text!r}")
+    if not 0.0 <= (overlap or 0.0) <= MOST_OVERLAP:
+        raise BadConfiguration(f"an overlap is 0 to {100 * MOST_OVERLAP:g} percent, got {text!r}")
     direction: Direction = "cross" if lanes == "cross" else "auto"
     return Pass(covers, direction, angle_deg, speed_m_s, overlap)  # type: ignore[arg-type]
 
@@ -187,7 +190,9 @@ def read_passes(text: str) -> tuple[Pass, ...]:
     Raises:
         BadConfiguration: the text is neither.
     """
-    if text.isdecimal() and int(text) <= MOST_PASSES:
+    if text.isdecimal():
+        if float(text) > MOST_PASSES:
+            raise BadConfiguration(f"at most {MOST_PASSES} passes, got {text}")
         return (Pass(),) * int(text)
     return tuple(read_pass(each) for each in text.split(","))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.figures import figures
 
@@ -24,10 +25,12 @@ Row = tuple[str, str, str, str]
 def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Difference]:
     """Return the differences of two runs' set-ups, without settings that only one run has."""
     found = []
+    # Where its bus is changes nothing that a robot does; each demo has other ports.
+    settings = {key: value for key, value in one.config.items() if not key.startswith("bus.")}
     for name, mine, theirs in (
         ("robot", one.robot, other.robot),
         ("version", one.version, other.version),
-        *((key, value, other.config.get(key)) for key, value in one.config.items()),
+        *((key, value, other.config.get(key)) for key, value in settings.items()),
         ("orders", len(one.orders), len(other.orders)),
     ):
         if mine is not None and theirs is not None and mine != theirs:
@@ -71,6 +74,8 @@ def compared_rows(one: ReviewDocument, other: ReviewDocument) -> list[Row]:
         if mine.value is not None and theirs.value is not None:
             less = round(mine.value - theirs.value, 1)
             words = f"{less:+,d}" if isinstance(less, int) else f"{less:+,.1f}"
+            if mine.is_time:
+                words = f"{'+' * (less > 0)}{clock(less)}"
             difference = words if less else "0"
         found.append((mine.name, mine.text, theirs.text, difference))
     return found

@@ -42,7 +42,7 @@ def document_of(review: Review) -> ReviewDocument:
         states[span.name] += span.seconds
     began = datetime.fromtimestamp(1e-9 * record.began_ns, UTC)
     document = ReviewDocument(
-        recording=record.recording_id,
+        recording=record.name,
         files=list(record.parts),
         robot=data.robot or None,
         version=data.version or None,

@@ -123,7 +123,8 @@ class ReviewDocument(msgspec.Struct):
         charges: each period of charging: at_s, seconds, level_from, level_to (0 to 1; null if
             unknown).
         longest_stand: the longest standstill during a mission: at_s, seconds, place (x, y) [m], and
-            the states of the mission meanwhile; null for none.
+            the states of the mission meanwhile, reason (of a path that led nowhere meanwhile, as
+            one that waits for another robot); null for none.
         faults: number of messages refused by the daemon.
         faults_by_code: number of these messages by error code.
         recorder_lost: number of samples that the recorder could not write, by its own count.

@@ -51,11 +51,12 @@ def count(value: float | None, unit: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ReviewFigure:
-    """A figure: name, text, and its value if it is a number."""
+    """A figure: name, text, its value if it is a number, and whether that is a time [s]."""
 
     name: str
     text: str
     value: float | None = None
+    is_time: bool = False
 
 
 def floor_words(document: ReviewDocument) -> str:
@@ -70,7 +71,8 @@ def figures(document: ReviewDocument) -> Iterator[ReviewFigure]:
     share = f" ({document.share_covered})" if document.share_covered else ""
     covered = document.covered_cells
     yield ReviewFigure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[document.complete])
-    yield ReviewFigure("duration", clock(document.duration_s), document.duration_s)
+    duration_s = document.duration_s
+    yield ReviewFigure("duration", clock(duration_s), duration_s, is_time=True)
     text = NOT_KNOWN if covered is None else f"{covered} of {document.coverable_cells} cells{share}"
     yield ReviewFigure("covered", text, covered)
     yield ReviewFigure("floor swept", floor_words(document) or NOT_KNOWN, document.swept_m2)
@@ -81,10 +83,9 @@ def figures(document: ReviewDocument) -> Iterator[ReviewFigure]:
     yield ReviewFigure("floor out of reach", _by_reason(document.out_of_reach_by_reason))
     for percent in MILESTONES:
         at_s = (document.reached_s or {}).get(str(percent))
-        text = "never" if document.reached_s else NOT_KNOWN
-        yield ReviewFigure(
-            f"{percent} % of cells covered after", text if at_s is None else clock(at_s), at_s
-        )
+        never = "never" if document.reached_s else NOT_KNOWN
+        text = never if at_s is None else clock(at_s)
+        yield ReviewFigure(f"{percent} % of cells covered after", text, at_s, is_time=True)
     for name, member, unit in NUMBERS:
         value: float | None = getattr(document, member)
         yield ReviewFigure(name, count(value, unit), value)

@@ -106,6 +106,27 @@ def swept_floor(
     return judge_floor(grid, track, robot, driven=kept.driven, stands_at=(x, y))
 
 
+def swept_between(
+    data: RunData, lattice: CoverageLattice, begin_s: float, end_s: float
+) -> tuple[float, float] | None:
+    """Return the floor swept between two times [m2]: all of it, and what was not swept before.
+
+    None if one of them is not known.
+    """
+    times = data.times
+
+    def swept(kept: NDArray[np.bool_]) -> JudgedFloor | None:
+        part = replace(data, pose_s=times[kept].tolist(), poses=data.track[kept].tolist())
+        return swept_floor(part, lattice)
+
+    before, then = swept(times <= begin_s), swept((times >= begin_s) & (times <= end_s))
+    if before is None or then is None:
+        return None
+    pixel_m2 = then.geometry.resolution**2
+    all_of_it, new = (int(pixels.sum()) for pixels in (then.swept, then.swept & ~before.swept))
+    return pixel_m2 * all_of_it, pixel_m2 * new
+
+
 @dataclass(frozen=True, slots=True)
 class RoomChapter:
     """A room at the end of the recording; see ``ReviewDocument.rooms``."""

@@ -20,7 +20,7 @@ from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.recording.read.timeline import DrawnLine, lines_in, read_drawings
-from fasaco_edge.review.floor_and_rooms import nearest_points
+from fasaco_edge.review.floor_and_rooms import nearest_points, swept_between
 from fasaco_edge.review.orders import CommandThen, commands_of, order_words
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.wire.documents.path_documents import Rectangle
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 # Period before the moment in which changes of the map are reported [s].
 MAP_S = 5.0
+# Period after the moment in which swept floor is counted, and around it whose track is drawn [s].
+DRIVE_S = 10.0
 # Period before and after the moment in which turns are searched, and longest turn [s].
 TURN_S = 2.0
 # Least angle of a turn [deg]. Among several turns the largest angle counts, minus this many degrees
@@ -96,7 +98,11 @@ class MapThen(msgspec.Struct):
 
 
 class Instant(msgspec.Struct):
-    """The state at one moment; times are the robot's [s] since the recording began."""
+    """The state at one moment; times are the robot's [s] since the recording began.
+
+    ``sweeps_m2``: floor that the tool passes in the ``DRIVE_S`` after it; ``sweeps_new_m2``: the
+    part of it that was not swept before.
+    """
 
     at_s: float
     state: str | None
@@ -106,6 +112,8 @@ class Instant(msgspec.Struct):
     y: float | None
     yaw_deg: float | None
     speed_m_s: float | None
+    sweeps_m2: float | None
+    sweeps_new_m2: float | None
     turn: TurnThen | None
     path_before: PathThen | None
     path: PathThen | None
@@ -149,6 +157,9 @@ def instant_at(review: Review, at_s: float) -> InstantPicture:
     )
     grid, change = _map_at(record, at_s)
     commands = commands_of(data)
+    lattice, sweeps = review.lattice, None
+    if lattice is not None:
+        sweeps = swept_between(data, lattice, at_s, at_s + DRIVE_S)
     past = [each for each in commands if each.at_s <= at_s]
     instant = Instant(
         at_s=round(at_s, 3),
@@ -159,6 +170,8 @@ def instant_at(review: Review, at_s: float) -> InstantPicture:
         y=round(pose[1], 3) if pose else None,
         yaw_deg=round(math.degrees(math.remainder(pose[2], math.tau)), 1) if pose else None,
         speed_m_s=_speed(data.times, data.track, at_s),
+        sweeps_m2=sweeps and round(sweeps[0], 3),
+        sweeps_new_m2=sweeps and round(sweeps[1], 3),
         turn=turn,
         path_before=before,
         path=path,

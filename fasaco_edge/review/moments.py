@@ -45,13 +45,17 @@ class Span:
 
 
 class Stand(msgspec.Struct, frozen=True):
-    """A standstill of the robot: time [s], place (x, y) [m], states of the mission meanwhile."""
+    """A standstill of the robot: time [s], place (x, y) [m], states of the mission meanwhile.
+
+    ``reason``: that of the path in the middle of it, if this path leads nowhere; else "".
+    """
 
     at_s: float
     seconds: float
     x: float
     y: float
     states: list[str]
+    reason: str = ""
 
 
 def spans_of(entered: Sequence[tuple[float, str, str]], end_s: float) -> tuple[Span, ...]:
@@ -95,7 +99,9 @@ def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
         return None
     since, seconds, x, y = (round(value, 3) for value in longest)
     meanwhile = [s.name for s in states if since < s.end_s and s.begin_s < since + seconds]
-    return Stand(since, seconds, x, y, list(dict.fromkeys(meanwhile)))
+    path = next((p.about for p in reversed(data.paths) if p.at_s <= since + seconds / 2), None)
+    reason = path.reason if path is not None and path.steps == 0 else ""
+    return Stand(since, seconds, x, y, list(dict.fromkeys(meanwhile)), reason)
 
 
 def _stand(data: RunData, begin_s: float, end_s: float) -> tuple[float, float, float, float] | None:

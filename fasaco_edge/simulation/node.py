@@ -12,7 +12,7 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, join, open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
+from fasaco_edge.errors import MalformedMessage, WrongFrame
 from fasaco_edge.host.processes import stop_event
 from fasaco_edge.simulation.world import Emission, World
 from fasaco_edge.wire import topics
@@ -108,11 +108,8 @@ def run_simulation(
         report: called about twice a second, and at the end.
 
     Raises:
-        BadConfiguration: ``speed`` is not above 0.
         BusUnavailable: the bus cannot be joined, and ``waits`` is False.
     """
-    if not speed > 0.0:
-        raise BadConfiguration(f"speed must be above 0, got {speed}")
     with ExitStack() as stack:
         stop = stack.enter_context(stop_event())
         joined = join(settings, stop) if waits else open_bus(settings)

@@ -16,7 +16,8 @@ SILENT = "the planner is silent"
 # Part of the text at a mission's end, left out here: ``possible`` adds it to the swept floor.
 _POSSIBLE = re.compile(r", or of [\d.]+ m2 if walls are a pixel thinner than on the map")
 
-
+# A cell's indices say nothing to people, and its place is drawn on the map.
+_AT_CELL = re.compile(r"(?<=path blocked) at cell \(-?\d+, -?\d+\)")
 # "Every cell" would contradict "47 of 49 m2" beside it: a cell counts by its centre.
 _ALL_COVERED = re.compile(r"every reachable cell( of the zones)? is covered")
 
@@ -27,7 +28,7 @@ def plain(text: str) -> str:
         text = text.replace(reason, words)
     text = text.replace(SILENT, "no status came from the daemon")
     text = _ALL_COVERED.sub(r"the tool has passed the centre of every cell\1 that it reaches", text)
-    return _POSSIBLE.sub("", text)
+    return _AT_CELL.sub("", _POSSIBLE.sub("", text))
 
 
 def possible(area: str) -> str:

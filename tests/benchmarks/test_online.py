@@ -312,7 +312,7 @@ def test_the_benchmark_online_prints_its_tables(capsys, tmp_path):
     words = ["--grids", str(file), "--starts", "1", "--ranges", "2"]
     assert main(["online", *words, "--proposals", "1000"]) == 0
     shown = capsys.readouterr().out
-    for words in ("1 missions in unknown", "rooms, 2 m", "latency", "goals"):
+    for words in ("1 missions in unknown", "rooms, 2 m", "latency", "goals of the default options"):
         assert words in shown
     assert "NOT ALL" not in shown
     assert "\\n" not in shown, "cells have two lines"

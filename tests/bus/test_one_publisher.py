@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
-from fasaco_edge.bus.one_publisher import SHOWN_S, OnePublisher
+from dataclasses import replace
+
+from fasaco_edge.bus.one_publisher import SHOWN_S, OnePublisher, ReturningMaps
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid
+from tests.support.rooms import WALL, fill, map_bytes, room
 
 SILENT_S = 4.0
+ROOM = room(4.0, 3.0)
+OPEN, WALLED = (
+    decode_occupancy_grid(map_bytes(pixels), ROOM.size)
+    for pixels in (ROOM, fill(ROOM, 2.0, 0.6, 2.1, 2.4, WALL))
+)
 
 
 class Sessions:
@@ -76,3 +85,18 @@ def test_a_sample_of_unknown_origin_counts():
     alone = maps(passing="r")
     assert [alone.takes(sender, 0.0) for sender in ("r", "", "r", "a")] == [True] * 4
     assert alone.conflict(0.0) == ""
+
+
+def test_of_two_maps_that_alternate_one_counts_while_it_arrives():
+    maps = ReturningMaps()
+    counted = [maps.takes((OPEN, WALLED)[turn % 2], float(turn)) for turn in range(10)]
+    assert counted == [True] * 4 + [False, True] * 3
+    assert maps.conflict(9.0) == "maps alternate, as from two publishers"
+    alone = [maps.takes(OPEN, 10.0 + second) for second in range(11)]
+    assert alone == [False] * 10 + [True]
+
+
+def test_two_maps_of_different_frames_both_count():
+    elsewhere = replace(OPEN, frame="upstairs")
+    maps = ReturningMaps()
+    assert all(maps.takes((OPEN, elsewhere)[turn % 2], float(turn)) for turn in range(10))

@@ -74,13 +74,16 @@ def test_ros_and_a_router(tmp_path, capsys):
         ([*GIVEN, "--domain", "7"], "--domain and --namespace are for maps from ROS 2"),
         (
             [*GIVEN, "--robot-radius", "20"],
-            "robot.radius_m: expected a number of at most 10, got 20",
+            "--robot-radius: expected a number of at most 10, got 20",
         ),
         (
             [*GIVEN, "--clearance", "-1"],
-            "robot.clearance_m: expected a number of at least 0, got -1.0",
+            "--clearance: expected a number of at least 0, got -1.0",
         ),
-        ([*GIVEN, "--name", "a/b"], "robot.name: "),
+        ([*GIVEN, "--name", "a/b"], "--name: "),
+        ([*GIVEN, "--robot-size", "20x1"], "--robot-size: expected a number of at most 7"),
+        ([*GIVEN, "--tool-width", "1e-300"], "--tool-width: must be in [1e-06, 1000] m"),
+        ([*GIVEN, "--connect", "here"], "--connect: 'here': no protocol before the address"),
     ],
 )
 def test_an_invalid_value_is_refused_and_not_written(words, said, tmp_path, capsys):
@@ -134,10 +137,10 @@ def test_a_typing_error_is_asked_for_again(tmp_path, typed, capsys):
     asked = capsys.readouterr().err
     for said in (
         "must be a number such as 0.25, got 'O,25'",
-        "robot.radius_m: expected a number of at most 10, got 25.0",
+        "]: expected a number of at most 10, got 25.0",
         "must be a number such as 0.25, got 'O.3'",
         "must be zenoh, rmw_zenoh, bridge, got 'zeno'",
-        "bus.connect[0]: '127.0.0.1:7447': no protocol before the address (an endpoint is ",
+        "]: '127.0.0.1:7447': no protocol before the address (an endpoint is ",
     ):
         assert said in " ".join(asked.split()) + " "
     assert asked.count("Radius of the disc") == 3
@@ -147,7 +150,7 @@ def test_an_invalid_option_is_refused_before_a_question(tmp_path, typed, capsys)
     typed("0.3\n")
     assert init(tmp_path / "robot.yaml", "--robot-radius", "20") == 78
     asked = capsys.readouterr().err
-    assert "robot.radius_m: expected a number of at most 10, got 20.0" in " ".join(asked.split())
+    assert "--robot-radius: expected a number of at most 10, got 20.0" in " ".join(asked.split())
     assert "Width of the" not in asked
 
 

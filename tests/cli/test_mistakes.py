@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -16,9 +17,11 @@ from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.host.processes import cpu_seconds
+from tests.support.disks import disk_fixture
 from tests.support.forked import run_forked
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge, free_endpoint
 
+full_disk = disk_fixture("64k")
 NOBODY = "tcp/127.0.0.1:1"
 MAP = "{image: map.png, resolution: 0.05, origin: [0, 0, 0], negate: 0}"
 
@@ -101,7 +104,13 @@ def folder(tmp_path, monkeypatch):
             "good.npy is a coverage grid (.npy), which lies in no",
         ),
         (f"simulate nowhere --connect {NOBODY}", 1, "no map 'nowhere'"),
-        (f"simulate office --speed 0 --connect {NOBODY}", 78, "--speed must be above 0, got 0"),
+        (
+            f"simulate office --speed 0 --connect {NOBODY}",
+            78,
+            "--speed: expected a number of at least 0.01",
+        ),
+        ("simulate office --robot-radius 20", 78, "--robot-radius: expected a number of at most"),
+        ("simulate office --battery-min -1", 78, "--battery-min must be at least 0, got -1"),
         ("rooms set 1", 78, "nothing to set: --passes, --priority, --skip or --no-skip"),
         ("simulate office --map-hz 50", 78, "--map-hz must be 1 to 5, got 50"),
         ("simulate office --range 0", 78, "--range must be above 0 m, got 0"),
@@ -131,8 +140,11 @@ def folder(tmp_path, monkeypatch):
         ),
         ("demo --map nowhere --out o", 1, "no map 'nowhere'"),
         ("follow --speed 0", 78, "--speed must be above 0 and at most 100, got 0"),
-        ("demo --speed 0 --out o", 78, "--speed must be above 0, got 0.0"),
-        ("demo --out good.npy", 78, "cannot write good.npy: File exists"),
+        ("demo --speed 0 --out o", 78, "--speed: expected a number of at least 0.01"),
+        ("demo --cell 30 --out o", 78, "--cell: expected a number of at most 10, got 30.0"),
+        ("demo --tool-width=30 --out o", 78, "--tool-width: expected a number of at most 10"),
+        ("demo --seed -1 --out o", 78, "--seed: expected a whole number of at least 0, got -1"),
+        ("demo --out good.npy", 78, "cannot write good.npy: good.npy is not a folder"),
         ("plan office --passes cross", 78, "--passes[0]: cross goes after a pass with lanes"),
         ("plan office --passes auto@2", 78, "at 2 m/s is faster than the robot, 0.25 m/s"),
         ("plan office --passes auto --planner fasaco", 78, "only colony-search has passes"),
@@ -146,7 +158,9 @@ def folder(tmp_path, monkeypatch):
         ("mission start --order order.yaml", 1, "order.yaml, line 1: zones[0].name: missing"),
         ("mission start --order order.json", 1, "order.json: not plain JSON"),
         ("mission start --order order.yaml --passes 2", 1, "--order must be the only option for"),
-        ("mission start --passes 0", 1, "passes: expected a whole number of at least 1, got 0"),
+        ("mission start --passes 0", 1, "--passes: expected a whole number of at least 1, got 0"),
+        ("mission start --until-min -3", 1, "--until-min: expected a number of at least 0"),
+        ("rooms set 1 --priority 101", 1, "--priority: expected a whole number of at most 100"),
         ("mission start --zone a:0,0;1,1;1,0;0,1", 1, "[0].polygon: crosses or touches itself"),
         ("mission start --zone a:0,0;1,0;nan,1", 1, "zones[0].polygon[2]: must be finite"),
         (f"mission status --connect {NOBODY}", 1, f"cannot connect to {NOBODY}\n"),
@@ -327,11 +341,21 @@ def test_a_demo_reports_that_its_time_is_up(folder):
     assert "hint: see" in ended.err or "left over" in ended.out or "the time is up" in ended.out
 
 
+@pytest.mark.parametrize("command", ["record --out .", "watch", "mission status"])
+def test_a_fleet_that_no_configuration_names_is_refused(command, capsys):
+    for name, said in (("", "of at least 1 letter"), ("w" * 65, "of at most 64 letters")):
+        with pytest.raises(SystemExit, match="2"):
+            main([*command.split(), "--fleet", name])
+        assert f"--fleet: expected a text {said}" in capsys.readouterr().err
+
+
 def test_a_demo_whose_daemon_refuses_shows_why(folder):
-    ended = fasaco_edge("demo", "--map", "office", "--cell", 20, "--out", "o")
+    (folder / "o").mkdir()
+    (folder / "o" / "state").touch()
+    ended = fasaco_edge("demo", "--map", "office", "--out", "o")
     assert ended.code == 1
     assert "the daemon ended with 78" in ended.err
-    assert "robot.tool_width_m: expected a number of at most 10, got 20.0" in ended.err
+    assert "cannot keep progress in o/state: o/state is not a folder" in ended.err
 
 
 def test_a_recorder_without_a_folder_is_an_error(folder):
@@ -343,7 +367,29 @@ def test_a_recorder_without_a_folder_is_an_error(folder):
     with daemon_process(folder, bus={"listen": [endpoint]}), Outsider(endpoint):
         ended = fasaco_edge("record", "--out", "good.npy", "--connect", endpoint)
     assert ended.code == 78
-    assert "cannot record into good.npy: File exists" in ended.err
+    assert "cannot record into good.npy: good.npy is not a folder" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ("--state good.npy", "cannot keep progress in good.npy: good.npy is not a folder"),
+        ("--state good.npy/in", "cannot keep progress in good.npy/in: good.npy is not a folder"),
+        ("--record good.npy", "cannot record into good.npy: good.npy is not a folder"),
+    ],
+)
+def test_a_daemon_with_a_file_for_a_folder_does_not_run(folder, option, said):
+    ended = fasaco_edge("run", "--state", "s", *option.split())
+    assert ended.code == 78
+    assert said in ended.err
+
+
+def test_a_demo_on_a_full_disk_names_its_file(full_disk):
+    with contextlib.suppress(OSError):
+        (full_disk / "ballast").write_bytes(bytes(100_000))
+    ended = fasaco_edge("demo", "--out", str(full_disk))
+    assert ended.code == 1
+    assert f"cannot write {full_disk / 'config.yaml'}: No space left on device" in ended.err
 
 
 def test_a_failing_disk_is_no_configuration_error():

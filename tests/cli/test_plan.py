@@ -13,6 +13,7 @@ from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
+from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -77,6 +78,9 @@ def test_rooms_are_those_of_the_map(plan, capsys, tmp_path):
     assert all(room["entered"] >= 1 for room in figures["rooms"])
     with Image.open(picture) as image:
         assert image.width > 500
+        key = image.crop((0, image.height - 60, image.width, image.height))
+        colours = {colour for _, colour in key.getcolors(1 << 16)}
+        assert {palette.START, palette.END} <= colours
     assert main(["plan", "flat", "--budget", "0.05", "--rooms"]) == 0
     assert "9.3 m2" in capsys.readouterr().out
 
@@ -201,7 +205,9 @@ def test_a_share_of_the_floor_can_be_asked_for(plan, tmp_path, caplog):
     asked, _ = plan(file, "--budget", 1, "--swept", 0.999)
     # On a busy machine the budget ends both after the first line.
     assert usual["floor"]["swept_share"] <= asked["floor"]["swept_share"] < 1.0
-    assert ("--swept 0.999" in caplog.text) == (asked["floor"]["swept_share"] < 0.999)
+    floor = asked["floor"]
+    warning = f"--swept 0.999: the line sweeps {floor['swept_share']:.4f}, and leaves "
+    assert (warning in caplog.text) == (floor["swept_share"] < 0.999)
 
 
 def test_cells_lie_along_the_walls(plan, tmp_path):

@@ -114,6 +114,7 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ("robot: {radius_m: 0}", "robot.radius_m: expected a number above 0, got 0"),
         ("robot: {radius_m: 10.5}", "robot.radius_m: expected a number of at most 10, got 10.5"),
         ("robot: {radius_m: .nan}", "robot.radius_m: expected a number above 0, got nan"),
+        ("robot: {tool_width_m: 1e-300}", "robot.tool_width_m: must be in [1e-06, 1000] m, got"),
         ("robot: {radius_m: wide}", "robot.radius_m: expected a number, got 'wide'"),
         ("robot: {radius_m: true}", "robot.radius_m: expected a number, got true"),
         ("robot: {radius_m: }", "robot.radius_m: expected a number, got null"),

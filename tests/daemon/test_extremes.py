@@ -10,6 +10,7 @@ import time
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.security import BusConfig
 from fasaco_edge.daemon.supervisor import FIRST_PAUSE_S, LONGEST_PAUSE_S, RecorderSupervisor
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -27,6 +28,18 @@ def test_a_recorder_that_cannot_be_started_is_tried_again(tmp_path, monkeypatch)
         assert "could not be started" in state.reason
         assert recorder.poll(100.0 + 2 * FIRST_PAUSE_S).restarts == 1
         recorder.close(1.0, 1.0)
+
+
+def test_a_recorder_without_a_folder_is_not_started_again(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    config = DaemonConfig(bus=BusConfig(listen=(free_endpoint(),)))
+    with open_bus(config.bus.settings(config.keys().prefix)) as bus:
+        recorder, now = RecorderSupervisor(config, bus, tmp_path / "file"), time.monotonic()
+        while recorder.poll(now).state == "starting":
+            time.sleep(0.01)
+        states = [recorder.poll(now + pause_s) for pause_s in (1.0, LONGEST_PAUSE_S, 3600.0)]
+        recorder.close(1.0, 1.0)
+    assert {(state.state, state.restarts) for state in states} == {("failed", 0)}
 
 
 def test_a_recorder_that_keeps_dying_starts_less_and_less_often(tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ import errno
 import logging
 import os
 import shutil
+import subprocess
 import time
 from dataclasses import replace
 from itertools import pairwise
@@ -31,10 +32,12 @@ from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState
 from tests.mission.world import CELL, Drive, MapReceived, building, pose_at
+from tests.support.disks import disk_fixture
 from tests.support.ledgers import CELL_M, contents, lane
 from tests.support.waiting import until
 
 DEADLINE_S = 60.0
+small_disk = disk_fixture("256k")
 
 
 def on_disk(folder: Path, cell_m: float = CELL_M) -> object:
@@ -53,6 +56,29 @@ def document(writer: LedgerWriter) -> dict[str, Any]:
 @pytest.fixture
 def retry_soon(monkeypatch):
     monkeypatch.setattr(disk_writer, "RETRY_S", 0.05)
+
+
+def test_a_folder_that_cannot_be_made_is_reported_at_the_start(tmp_path):
+    folder = tmp_path / "state"
+    folder.write_text("in the way")
+    writer = open_ledger(folder, "robot", CELL_M)
+    assert f"cannot write {folder / 'robot.ledger'}: " in document(writer)["fault"]
+    assert len(writer.disk.take_faults()) == 1
+    folder.unlink()
+    writer.put(lane(1))
+    until(lambda: document(writer)["fault"] is None)
+    writer.disk.close(1.0)
+
+
+def test_a_read_only_disk_is_reported_at_the_start(small_disk):
+    (small_disk / "robot.ledger.lock").touch()
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    writer = open_ledger(small_disk, "robot", CELL_M)
+    assert "Read-only file system: progress is kept in memory" in document(writer)["fault"]
+    subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
+    writer.put(lane(1))
+    until(lambda: document(writer)["fault"] is None)
+    writer.disk.close(1.0)
 
 
 def test_a_snapshot_that_is_put_is_written(tmp_path):

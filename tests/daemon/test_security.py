@@ -17,6 +17,7 @@ from tests.support.outsider import Collector, Outsider, open_client
 from tests.support.processes import PROGRAM, daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room
 from tests.support.secured import NAMES, authority, needs_openssl, secured_daemon, transport
+from tests.support.waiting import until
 
 pytestmark = needs_openssl
 START = json.dumps({"command": "start"}).encode()
@@ -218,9 +219,9 @@ def test_garbage_and_half_open_sockets_are_survived(house, unharmed):
 
 
 def test_the_command_line_shows_a_certificate(house, tmp_path):
-    def ask(name):
+    def ask(name, files=None):
         file = tmp_path / f"{name}.yaml"
-        file.write_text(json.dumps({"kind": "tls", "tls": house.ca.files(name)}))
+        file.write_text(json.dumps({"kind": "tls", "tls": files or house.ca.files(name)}))
         words = ["mission", "status", "--json", "--timeout", "2", "--connect", house.endpoint]
         command = [*PROGRAM, *words, "--security", str(file)]
         return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
@@ -229,6 +230,18 @@ def test_the_command_line_shows_a_certificate(house, tmp_path):
     assert json.loads(allowed.stdout)["robot"] == "robot"
     assert refused.returncode == 1
     assert "no daemon answers" in refused.stderr
+    # Zenoh says no more than that it cannot connect.
+    outdated = ask("outdated", house.ca.sign("outdated", days=-1))
+    assert "outdated.pem: certificate has expired" in outdated.stderr
+    assert "opens no session: it hangs, is not on a Zenoh bus, or requires" in outdated.stderr
+    foreign = authority(tmp_path / "foreign", "boss").files("boss")
+    assert "boss.pem: unable to get" in ask("foreign", foreign | {"root_ca": house.ca.root}).stderr
+
+
+def test_a_daemon_with_an_outdated_certificate_says_so(tmp_path):
+    late = authority(tmp_path / "late").sign("robot", days=-1)
+    with secured_daemon(tmp_path, security={"tls": late}) as house:
+        until(lambda: "robot.pem: certificate has expired" in house.daemon.log_text())
 
 
 def test_a_recorder_of_the_daemon_shows_its_certificate(tmp_path):

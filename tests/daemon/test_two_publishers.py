@@ -94,9 +94,17 @@ def test_two_anonymous_publishers_are_found_by_alternating_maps(tmp_path):
         program(daemon.endpoint, stamps=False) as one,
         program(daemon.endpoint, stamps=False) as other,
     ):
-        in_turn(one, other, "map", (map_bytes(ROOM, 2), map_bytes(WALLED, 3)))
+        paths = outsider.listen("path")
+        outsider.put("pose", pose_bytes(*lanes(1)[0]))
+        maps = map_bytes(ROOM, 2), map_bytes(WALLED, 3)
+        in_turn(one, other, "map", maps)
         status = outsider.wait_status(has_two)
         assert text_of(status) == "maps alternate, as from two publishers"
+        time.sleep(1.0)  # for the path of the map that counts
+        before = len(paths.heard)
+        assert before
+        in_turn(one, other, "map", maps)
+        assert len(paths.heard) == before
 
 
 def test_poses_and_masks_of_a_second_publisher_do_not_count(tmp_path):

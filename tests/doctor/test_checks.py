@@ -206,6 +206,14 @@ def test_a_read_only_disk_fails_the_check(tmp_path):
     assert "read-only" in computer.disk(CheckContext(config)).found
 
 
+def test_a_file_in_place_of_the_state_folder_fails_the_check(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    config = DaemonConfig(mission=MissionPolicyConfig(state_dir=str(tmp_path / "file" / "in")))
+    found = computer.disk(CheckContext(config))
+    assert found.level is Level.FAIL
+    assert f"{tmp_path / 'file'} is not a folder" in found.found
+
+
 def test_a_link_in_place_of_the_lock_fails_the_check(tmp_path):
     config = DaemonConfig(mission=MissionPolicyConfig(state_dir=str(tmp_path)))
     assert computer.disk(CheckContext(config)).level is Level.OK

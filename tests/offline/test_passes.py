@@ -1,6 +1,7 @@
 """Plans of several passes: where they run, from where to where, and what is wrong with others."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -106,9 +107,20 @@ def test_lanes_need_the_search():
             fe.plan(fe.load_map("office"), **options)
 
 
-def test_one_text_is_no_list_of_passes():
-    with pytest.raises(BadConfiguration, match=r"must be a list such as \['edge'\], got 'edge'"):
-        fe.plan_passes(fe.load_map("office"), passes="edge")
+@pytest.mark.parametrize(
+    ("passes", "such"),
+    [
+        ("edge", "['edge'], got 'edge'"),
+        ("rest,cross", "['rest', 'cross'], got 'rest,cross'"),
+        # As --passes 2 of the command line.
+        (2, "['edge', 'auto'], got 2"),
+        ([1], "['edge', 'auto'], got [1]"),
+        ([], "['edge', 'auto'], got []"),
+    ],
+)
+def test_what_is_no_list_of_passes_is_named(passes, such):
+    with pytest.raises(BadConfiguration, match=re.escape(f"must be a list such as {such}")):
+        fe.plan_passes(fe.load_map("office"), passes=passes)
 
 
 def test_a_slow_pass_takes_longer():

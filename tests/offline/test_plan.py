@@ -182,6 +182,22 @@ def test_the_picture_has_the_figures_of_the_summary(monkeypatch):
     assert turns in dict(rows_of(planned))["line"]
 
 
+def test_a_search_beyond_its_budget_says_why():
+    plan = fe.plan(fe.load_map("office"), search=fe.Search(budget_s=0.01))
+    why = "the first line took longer than the budget of 0.01 s"
+    assert dict(rows_of(plan))["search"] == f"{plan.wall_s:.1f} s: {why}"
+
+
+def test_the_row_of_a_curve_repeats_no_figure_of_the_line():
+    office, quick = fe.load_map("office"), fe.Search(budget_s=0.01)
+    for reverses, end in ((True, " between forward and backward"), (False, ", forward only")):
+        robot = fe.Robot(turn_radius_m=0.3, reverses=reverses)
+        rows = dict(rows_of(fe.plan(office, robot, line="quick", search=quick)))
+        assert rows["curve"].startswith("arcs of 0.3 m or more, ")
+        assert rows["curve"].endswith(end)
+        assert rows["line"].split()[1] not in rows["curve"]
+
+
 def test_a_summary_names_the_size_of_the_map():
     """A resolution of 5 in place of 0.05 shows there, and nowhere else."""
     office = fe.plan(fe.load_map("office"), line="cells", search=QUICK)

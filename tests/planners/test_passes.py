@@ -6,7 +6,15 @@ import pytest
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.cost import ANY_LANES, COLUMNS, ROWS
-from fasaco_edge.planners.passes import Laid, Pass, edge_cells, laid, read_pass, wanted_by
+from fasaco_edge.planners.passes import (
+    Laid,
+    Pass,
+    edge_cells,
+    laid,
+    read_pass,
+    read_passes,
+    wanted_by,
+)
 
 
 @pytest.mark.parametrize(
@@ -29,13 +37,28 @@ def test_a_text_is_a_pass(text, read, name):
     assert read_pass(text).name == name
 
 
-NO_PASSES = ":cross 30 361deg auto%51 auto% nandeg deg cross@0 cross@fast cross@nan walls:30 corner"
+NO_PASSES = ":cross 30 auto% nandeg deg cross@fast cross@nan walls:30 corner"
 
 
 @pytest.mark.parametrize("text", ["", *NO_PASSES.split()])
 def test_other_texts_are_refused_by_name(text):
     with pytest.raises(BadConfiguration, match="a pass is edge, rest, auto"):
         read_pass(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("361deg", "an angle is up to 360 deg, got '361deg'"),
+        ("auto%51", "an overlap is 0 to 50 percent, got 'auto%51'"),
+        ("cross@0", "a speed is above 0 and at most 10 m/s, got 'cross@0'"),
+        ("auto@inf", "a speed is above 0 and at most 10 m/s, got 'auto@inf'"),
+        ("101", "at most 100 passes, got 101"),
+    ],
+)
+def test_a_number_out_of_range_is_refused_by_its_name(text, said):
+    with pytest.raises(BadConfiguration, match=said):
+        read_passes(text)
 
 
 @pytest.mark.parametrize(

@@ -224,7 +224,8 @@ def refused(recording, tmp_path_factory):
         "for name, file in json.loads(sys.argv[1]).items():\n"
         "    told = ''\n"
         "    try:\n        read_review([pathlib.Path(file)])\n"
-        "    except FasacoError as error:\n        told = f'{type(error).__name__} {error}'\n"
+        "    except FasacoError as error:\n"
+        "        told = f'{type(error).__name__} {error} {error.hint}'\n"
         "    print(json.dumps([name, told]), flush=True)\n"
     )
     words = [
@@ -242,6 +243,7 @@ def refused(recording, tmp_path_factory):
 def test_a_false_claim_is_refused_in_little_memory(refused, lie):
     assert refused[lie].startswith("UnreadableRecording")
     assert LYING_CHUNKS.get(lie, ("", ""))[1] in refused[lie]
+    assert "the file is damaged" in refused[lie]
 
 
 @pytest.mark.parametrize("seed", range(4))

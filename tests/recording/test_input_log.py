@@ -164,6 +164,15 @@ def test_paths_are_kept_as_digests_and_statuses_on_change(tmp_path):
     assert [one.sample for one in statuses] == [desk.told[at].sample for at in (1, 3, 5)]
 
 
+@pytest.mark.parametrize(("time_scale", "kept"), [(1.0, 3), (0.5, 3), (20.0, 20)])
+def test_statuses_are_kept_once_in_15_s_of_the_robot(tmp_path, time_scale, kept):
+    """At 20 times real time the page of a demo showed figures five minutes old."""
+    desk, config = Desk(tmp_path), {"robot": {"time_scale": time_scale}}
+    for rss_mb in range(20):
+        desk.hear("status", encode_json({"rss_mb": rss_mb, "config": config}), after_s=1.0)
+    assert len(list(RecordedSamples(desk.close()))) == kept
+
+
 def test_changes_of_rooms_are_kept_and_shares_now_and_then(tmp_path):
     desk = Desk(tmp_path)
 

@@ -16,10 +16,14 @@ from fasaco_edge.recording.scene import archetypes
 from fasaco_edge.recording.scene.curves import OF_PATH, OF_STATUS, PERIOD_NS, Curves
 from fasaco_edge.recording.scene.drawings import LOGGED_AGAIN_NS, PathDrawing
 from fasaco_edge.recording.scene.layers import BURST_S, RATES, Anchor, Layers, size_in_file
+from fasaco_edge.recording.scene.runcard import RunDescription
+from fasaco_edge.recording.scene.scene import Scene
+from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.status import BatteryReport, Status
 from fasaco_edge.wire.messages.paths import PathMessage
 from tests.support.recordings import SCALAR, TEXT, read_column, writer_in
+from tests.support.statuses import FULL
 
 SECOND_NS = 1_000_000_000
 RATE = RATES[entities.MAP]
@@ -138,6 +142,29 @@ def test_constants_are_drawn_rarely_and_changes_at_once(tmp_path):
     noisy = read_column(part, "noisy", SCALAR)
     assert len(noisy.values) == 4
     assert read_column(part, "last", SCALAR).values[-1] == [101.0]
+
+
+def floors_drawn(folder, time_scale):
+    """Return the number of drawings of floor that changes each second, for two minutes."""
+    writer, rng = writer_in(folder), np.random.default_rng(1)
+    scene = Scene(writer, RunDescription("robot", "now"))
+    config = {"robot": {"time_scale": time_scale}}
+    scene.add_status(decode_tolerant(encode_json(FULL | {"config": config}), Status))
+    for second in range(120):
+        writer.at(second * SECOND_NS)
+        swept = rng.integers(0, 101, (60, 60), dtype=np.int8)
+        scene.add_floor(OccupancyGrid(GridGeometry(60, 60, 0.05, Pose2D(0.0, 0.0)), swept))
+    # Without ``finish``, which draws what waits.
+    assert writer.close()
+    (part,) = folder.glob("*.rrd")
+    return len(read_column(part, entities.FLOOR, "GridMap:data").values)
+
+
+def test_a_robot_faster_than_life_is_drawn_more_often(tmp_path):
+    for name in ("real", "fast"):
+        (tmp_path / name).mkdir()
+    assert floors_drawn(tmp_path / "real", 1.0) < 30
+    assert floors_drawn(tmp_path / "fast", 20.0) == 120
 
 
 def shown(folder, paths):

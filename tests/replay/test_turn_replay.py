@@ -29,6 +29,7 @@ from fasaco_edge.review.review import read_review
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.turns import EarlySample, decode_turns
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
+from fasaco_edge.wire.reasons import WORDS
 from tests.replay.scenarios import changed, places, without
 from tests.support.recorded_mission import record_mission
 from tests.wire.schemas import check
@@ -240,7 +241,10 @@ def test_a_gap_in_the_log_ends_the_comparison(samples):
 def test_the_command_says_that_it_is_equal(recording, capsys):
     words = ["replay", *map(str, recording.paths)]
     assert main(words) == 0
-    assert "equal bit for bit" in capsys.readouterr().out
+    table = capsys.readouterr().out
+    assert "equal bit for bit" in table
+    # In the words of the review.
+    assert not any(reason in table for reason in WORDS)
     assert main([*words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     summary = told["summary"]

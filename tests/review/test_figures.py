@@ -16,7 +16,8 @@ from fasaco_edge.review.moments import (
     spans_of,
 )
 from fasaco_edge.review.review import review_of
-from fasaco_edge.review.run_data import RunData, StatusSample
+from fasaco_edge.review.run_data import PathSample, RunData, StatusSample
+from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.replies import CoverageReport
 from fasaco_edge.wire.documents.status import ErrorCounts, Status
 
@@ -37,7 +38,7 @@ def shares(drawn, counted):
         )
         for at_s, covered, cells in counted
     ]
-    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, np.zeros(2), ())
+    record = RunRecord((), 0, 0, RobotClock(0), plots, {}, {}, np.zeros(2), ())
     return review_of(record, RunData(statuses=statuses), 0)
 
 
@@ -61,7 +62,11 @@ def test_the_longest_stand_neither_drives_nor_turns():
     states = spans_of([(0.0, "covering", ""), (4.0, "paused", ""), (5.0, "covering", "")], 12.0)
     stand = longest_stand(data, states)
     assert (stand.at_s, stand.seconds, stand.x, stand.y) == (2.0, 4.0, 2.0, 0.0)
-    assert stand.states == ["covering", "paused"]
+    assert (stand.states, stand.reason) == (["covering", "paused"], "")
+    # A robot of a fleet is "covering" while it waits: the path says for what.
+    waits = PathAttachment(revision=2, reason="waits for r1")
+    data.paths = [PathSample(0.0, PathAttachment(steps=9)), PathSample(2.5, waits)]
+    assert longest_stand(data, states).reason == "waits for r1"
     assert longest_stand(data, spans_of([(0.0, "done", "")], 12.0)) is None
     assert longest_stand(data, spans_of([(50.0, "covering", "")], 60.0)) is None
 

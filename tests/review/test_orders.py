@@ -183,6 +183,7 @@ ORDER = OrderChapter("itself", 0.0, 100.0, None, "done", True, 400, 400)
 def run(config=(), **changes):
     """Return as much of a document as two are compared by."""
     settings = {"robot.tool_width_m": 0.3, "planner.line": "thorough", "robot.overlap": 0.1}
+    settings |= {"bus.connect": "tcp/127.0.0.1:1"}
     base = {
         "robot": "maja",
         "version": "1.0",
@@ -207,6 +208,7 @@ def run(config=(), **changes):
         (run(map=MapSize(rows=100, cols=210, resolution_m=0.05)), [], True),
         (run(map=MapSize(rows=100, cols=300, resolution_m=0.05)), ["building"], False),
         (run(orders=[ORDER, ORDER]), ["orders"], False),
+        (run(config={"bus.connect": "tcp/127.0.0.1:2"}), [], True),
     ],
 )
 def test_differing_setups_are_listed(other, what, compares):
@@ -226,7 +228,7 @@ def test_long_values_of_differing_settings_are_cut(capsys):
 
 
 def test_numbers_have_a_difference():
-    one, other = run(), run(driven_m=1.5, faults=2, paths=4)
+    one, other = run(), run(driven_m=1.5, faults=2, paths=4, duration_s=112.5)
     rows = {name: less for name, _, _, less in compared_rows(one, other)}
     assert (rows["driven"], rows["messages refused"], rows["paths published"]) == (
         "+1.5",
@@ -234,6 +236,8 @@ def test_numbers_have_a_difference():
         "-4",
     )
     assert rows["complete"] == ""
+    # A time has the form of the times beside it.
+    assert rows["duration"] == "-1:52.5"
 
 
 @pytest.mark.parametrize(

@@ -185,9 +185,16 @@ def test_the_newest_of_several_runs_is_reviewed(parts, other, capsys):
     earlier, newest = sorted(map(recording_id, (parts[0], other[0])))
     assert main(["review", *map(str, (*parts, *other)), "--json"]) == 0
     told = capsys.readouterr()
-    assert json.loads(told.out)["recording"] == newest
+    assert newest.startswith(json.loads(told.out)["recording"])
     assert f"2 runs: this is the newest, {newest}; for another run" in told.err
     assert f"as {earlier}-*.rrd" in told.err
+
+
+def test_a_recording_has_the_name_of_its_files(parts, tmp_path):
+    copies = [tmp_path / f"monday-part{number}.rrd" for number in range(1, len(parts) + 1)]
+    for copy, part in zip(copies, parts, strict=True):
+        copy.write_bytes(part.read_bytes())
+    assert document_of(read_review(copies)).recording == "monday"
 
 
 def test_two_runs_side_by_side(parts, other, tmp_path, capsys):

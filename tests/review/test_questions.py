@@ -19,9 +19,9 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.conversion import document_of
 from fasaco_edge.review.floor_and_rooms import swept_floor
-from fasaco_edge.review.instant import instant_at
+from fasaco_edge.review.instant import MapThen, instant_at
 from fasaco_edge.review.output.answers import instant_rows
-from fasaco_edge.review.output.pictures import draw_spots
+from fasaco_edge.review.output.pictures import draw_spots, spot_lines
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain
@@ -115,6 +115,16 @@ def test_a_turn_of_the_robot_is_explained(review):
     assert instant.path.changed.x_max == 2.0
 
 
+def test_a_stretch_sweeps_new_floor_or_is_a_way(review):
+    first = instant_at(review, review.data.pose_s[0]).instant
+    assert 0.0 < first.sweeps_new_m2 < first.sweeps_m2
+    words = dict(instant_rows(first))["sweeps"]
+    assert words.endswith(f" of {first.sweeps_m2:.2f} m2 for the first time, in the next 10 s")
+    # Back on the line along which it came.
+    back = instant_at(review, turned_s(review)).instant
+    assert back.sweeps_new_m2 == 0.0 < back.sweeps_m2
+
+
 def test_changes_of_the_map_and_commands_are_listed(review):
     instant = instant_at(review, turned_s(review)).instant
     # A band of 40 cm across the room, of which the box and two walls are no floor.
@@ -126,6 +136,8 @@ def test_changes_of_the_map_and_commands_are_listed(review):
     told = dict(instant_rows(instant))
     assert told["order"].startswith("zone a, keep out of")
     assert "seen for the first time" in told["map"]
+    quiet = structs.replace(instant, map=MapThen(3.0, 0.0, 0.0, 0.0, None))
+    assert dict(instant_rows(quiet))["map"] == "no change in the 5 s before"
     assert "facing" in told["robot"]
 
 
@@ -170,6 +182,9 @@ def test_the_reason_of_an_unswept_spot_is_found(review, place, why, words):
     assert spot.why == why
     assert words in spot.words
     assert spot.swept is (why == "swept")
+    assert spot_lines([spot])[0].startswith("at: ")
+    # In the picture each mark has its number.
+    assert {line.split()[0] for line in spot_lines([spot, spot])} == {"1", "2"}
 
 
 def test_floor_of_a_time_without_poses_is_not_called_missed(review):

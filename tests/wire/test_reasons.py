@@ -34,5 +34,6 @@ def test_a_reason_is_shown_in_plain_words() -> None:
     possible = " (of 53.7 m2 if the map shows walls too thick)"
     assert plain(ending) == "47.8 of 49.4 m2 of floor swept"
     assert swept(FloorReport(47.8, 49.4, (FloorLeft(1.6),), (), 53.7)).endswith(" m2" + possible)
-    for text in ("map: 3 cells more", "path blocked", ""):
+    assert plain("path blocked at cell (-7, 17)") == "path blocked"
+    for text in ("map: 3 cells more", "path blocked", "map: passages changed at 2 cells", ""):
         assert plain(text) == text

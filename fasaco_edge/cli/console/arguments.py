@@ -102,6 +102,16 @@ def pair_of_floats(text: str) -> tuple[float, float]:
     return x, y
 
 
+def fleet_name(text: str) -> str:
+    """Read the name of a fleet, as ``fleet.name`` of a configuration."""
+    from fasaco_edge.config.config import FleetConfig
+    from fasaco_edge.host.documents import inspected
+
+    for fault in inspected(FleetConfig, {"name": text}, BadConfiguration)[1]:
+        raise argparse.ArgumentTypeError(fault.what)
+    return text
+
+
 def seconds(least: float = 0.0, most: float = 3600.0) -> Callable[[str], float]:
     """Return a reader of a time above ``least``, up to ``most`` [s]."""
 
@@ -203,7 +213,7 @@ def _client(name: str, connect: tuple[str, ...], security_file: str | None) -> B
     from fasaco_edge.config.security import read_client_security
 
     security = read_client_security(security_file, connect)
-    security.warn_of_clock()
+    security.warn_of_certificate()
     return BusSettings("client", connect, secured=security.of_client())
 
 
@@ -246,6 +256,8 @@ def naming(place: Path) -> Iterator[None]:
     """
     try:
         yield
+    except FileExistsError as error:  # of mkdir
+        raise _unwritable(place, f"{error.filename} is not a folder") from error
     except OSError as error:
         raise _unwritable(place, error.strerror or str(error)) from error
 

@@ -71,6 +71,13 @@ class Parser(argparse.ArgumentParser):
             meant = f"did you mean {files[0]} {unknown[0]}?" if files and is_file else ""
         self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
 
+    def typed(self, dest: str) -> str:
+        """Return the option that sets ``dest``: as it was typed, else its first name."""
+        actions = self._option_string_actions.items()
+        names = [name for name, action in actions if action.dest == dest]
+        typed = (word.partition("=")[0] for word in self._given)
+        return next((name for name in typed if name in names), names[0])
+
     def _get_value(self, action: argparse.Action, arg_string: str) -> Any:  # noqa: ANN401
         try:
             return super()._get_value(action, arg_string)

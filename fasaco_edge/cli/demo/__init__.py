@@ -13,7 +13,9 @@ from fasaco_edge.cli.console.arguments import (
     Subcommand,
     add_json,
     naming,
+    seconds,
 )
+from fasaco_edge.cli.console.checked_options import checked_members
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.client.phrases import scale_words
@@ -42,6 +44,8 @@ summary.json and --json hold:
 RUNS = Path("runs")
 MOST_IN_DEMO = 8
 SPEED, FLEET_SPEED = 20.0, 5.0
+# Options, and the members of ``RobotConfig`` that they set.
+ROBOT_OPTIONS = {"speed": "time_scale", "robot_radius": "radius_m", "cell": "tool_width_m"}
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -95,7 +99,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, metavar="DIR", help="folder for the results (default: ./runs/<time>)"
     )
     add_json(parser, "the summary")
-    parser.add_argument("--timeout", type=float, default=1800.0, metavar="S", help="time limit [s]")
+    parser.add_argument(
+        "--timeout", type=seconds(most=1e6), default=1800.0, metavar="S", help="time limit [s]"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -103,12 +109,14 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.cli.demo.mission import DemoMission
     from fasaco_edge.cli.demo.robots import demo_robots
     from fasaco_edge.cli.demo.summary import print_summary, summarise
+    from fasaco_edge.config.config import PlannerConfig
+    from fasaco_edge.config.robot import RobotConfig
 
     find_map(args.map)
     if args.speed is None:
         args.speed = SPEED if args.robots == 1 else FLEET_SPEED
-    if not args.speed > 0:
-        raise BadConfiguration(f"--speed must be above 0, got {args.speed}")
+    checked_members(RobotConfig, args, ROBOT_OPTIONS)
+    checked_members(PlannerConfig, args, {"seed": "seed"})
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with naming(out):
         if args.out is None:

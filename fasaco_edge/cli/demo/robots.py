@@ -9,6 +9,7 @@ from pathlib import Path
 
 import yaml
 
+from fasaco_edge.cli.console.arguments import writing
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.planners.grids import start_point
@@ -67,7 +68,8 @@ class DemoRobot:
             x_m, y_m = self.start
             config["mission"] = {"dock": {"x_m": x_m, "y_m": y_m, "approach_m": 0.0}}
             config["battery"] = {}
-        self.config.write_text(yaml.safe_dump(config), encoding="utf-8")
+        with writing(self.config) as new:
+            new.write_text(yaml.safe_dump(config), encoding="utf-8")
 
     def programs(self, args: argparse.Namespace, endpoint: str) -> list[tuple[str, list[str]]]:
         """Return the name of each program to start, and its arguments for `fasaco-edge`."""

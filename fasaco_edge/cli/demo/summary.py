@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.cli.console import terminal
+from fasaco_edge.cli.console.arguments import writing
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.demo.mission import MissionEnding
 from fasaco_edge.cli.demo.robots import DemoRobot
@@ -122,9 +123,8 @@ def summarise(
         picture=str(out / "mission.png"),
     )
     _draw(args, truth, summary)
-    (out / "summary.json").write_text(
-        json.dumps(asdict(summary), indent=1) + "\n", encoding="utf-8"
-    )
+    with writing(out / "summary.json") as new:
+        new.write_text(json.dumps(asdict(summary), indent=1) + "\n", encoding="utf-8")
     return summary
 
 

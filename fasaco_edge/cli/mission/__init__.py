@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
-from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_common
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_common, fleet_name
+from fasaco_edge.cli.console.checked_options import naming_options
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import agrees, err, may_ask
@@ -130,6 +131,7 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     parser.add_argument(
         "--fleet",
+        type=fleet_name,
         metavar="NAME",
         help="command each robot of this fleet (`fleet.name` of its configuration)",
     )
@@ -241,7 +243,8 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
         name: value for name, value in options.items() if value is not None and value is not False
     }
     if args.order is None:
-        return order_document(read_order(given))
+        with naming_options(args, {"passes": "passes", "until_min": "until_min"}):
+            return order_document(read_order(given))
     if given:
         options_given = ("zone" if name == "zones" else name.replace("_", "-") for name in given)
         names = ", ".join(f"--{name}" for name in options_given)

@@ -234,8 +234,9 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         type=float,
         metavar="S",
         help="time for the search of the walk and its line [s]; a first walk and line are always "
-        f"finished, a planner of your own is stopped (default: {BUDGET_S:g} for colony-search, "
-        f"{OWN_BUDGET_S:g} for a planner of your own, no limit for others)",
+        f"finished, a planner of your own is stopped (default: planner.budget_s of --config, else "
+        f"{BUDGET_S:g} for colony-search, {OWN_BUDGET_S:g} for a planner of your own, no limit for "
+        "others)",
     )
     group.add_argument(
         "--swept",

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from fasaco_edge.cli.console import terminal
+from fasaco_edge.cli.console.checked_options import checked_members, given_members
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.host.documents import inspected
 from fasaco_edge.offline.settings import CELLS, LIKE_OWN, Search, default_line
 from fasaco_edge.planners.own.loading import UserCode, load
 from fasaco_edge.planners.planner import SearchProgress
@@ -104,7 +104,7 @@ def read_request(args: argparse.Namespace) -> RequestedPlan:
         PlannerFailed: the file of the user's planner raised an exception.
     """
     config = None if args.config is None else load_config(args.config)
-    given, own = _given(args, SEARCH_OPTIONS), None
+    given, own = given_members(args, SEARCH_OPTIONS), None
     if ":" in given.get("planner", ""):
         own, given["planner"] = load(given["planner"]), LIKE_OWN
     search = replace(_search(config), **given)
@@ -121,10 +121,7 @@ def read_request(args: argparse.Namespace) -> RequestedPlan:
     robot = config.robot if config else RobotConfig()
     if config is None and line == CELLS:
         robot = msgspec.structs.replace(robot, quarter_turn_s=0.0)  # as in the paper
-    changes = _given(args, ROBOT_OPTIONS)
-    for fault in inspected(RobotConfig, changes, BadConfiguration)[1]:
-        option = next(name for name, member in ROBOT_OPTIONS.items() if member == fault.key)
-        raise BadConfiguration(fault.what, key=f"--{option.replace('_', '-')}")
+    changes = checked_members(RobotConfig, args, ROBOT_OPTIONS)
     if args.turn_s is not None:
         changes["turn_deg_s"] = None
     if args.forward_only:
@@ -159,9 +156,3 @@ def _search(config: DaemonConfig | None) -> Search:
     planner = msgspec.structs.asdict(config.planner)
     names = {field.name for field in fields(Search)} & planner.keys()
     return Search(planner=planner["name"], **{name: planner[name] for name in names})
-
-
-def _given(args: argparse.Namespace, members: Mapping[str, str]) -> dict[str, Any]:
-    """Return the values of the given options by the members that they set."""
-    values = {member: getattr(args, option) for option, member in members.items()}
-    return {member: value for member, value in values.items() if value is not None}

@@ -96,8 +96,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--at",
         type=_time,
         metavar="MM:SS",
-        help="show this time since the recording began: robot, paths before and after, plan and "
-        "who found it, changes of the map, commands; --png draws it",
+        help="show this time since the recording began: robot, floor that it sweeps next, paths "
+        "before and after, plan and who found it, changes of the map, commands; --png draws it",
     )
     parser.add_argument(
         "--point",

@@ -10,6 +10,7 @@ files without covered cells and swept floor.
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import os
 import re
@@ -74,16 +75,26 @@ class LedgerFile:
         # Whether the new generation is complete, but not yet renamed.
         self._moving = False
 
-    def lock(self) -> None:
+    def lock(self) -> OSError | None:
         """Lock this ledger against other processes until this one ends.
+
+        Returns why it cannot be written at present: its folder is missing or read-only. Without a
+        folder the first write locks it.
 
         Raises:
             LedgerFileError: another process holds the lock.
         """
         self._exclusive = True
-        # Without a folder, the lock is taken before the first write.
-        with contextlib.suppress(OSError):
+        folder = self.path.parent
+        try:
             self._take_lock()
+            if os.access(folder, os.W_OK):
+                return None
+            is_read_only = os.statvfs(folder).f_flag & os.ST_RDONLY
+        except OSError as error:
+            return error
+        code = errno.EROFS if is_read_only else errno.EACCES
+        return OSError(code, os.strerror(code))
 
     def load(self, cell_m: float) -> LoadedLedger:
         """Return the newest complete ledger and any fault; finish an interrupted write."""

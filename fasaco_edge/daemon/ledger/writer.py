@@ -165,7 +165,16 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
         LedgerFileError: another process writes this ledger.
     """
     file = LedgerFile(folder, robot)
-    file.lock()
+    error = file.lock()
+    writer = _loaded(file, cell_m, fresh=fresh)
+    if error is not None:
+        # Reported at once: the first write may be much later.
+        writer.disk.trouble = writer.disk.note(_cannot_write(file, error))
+    return writer
+
+
+def _loaded(file: LedgerFile, cell_m: float, *, fresh: bool) -> LedgerWriter:
+    """Return the writer of a ledger that is continued, or started over."""
     found = file.load(cell_m)
     if not fresh:
         return _continued(file, found, cell_m)

@@ -241,9 +241,8 @@ class Inbox:
         turn log contains them only from then on.
         """
         maps, faults = self._newest_maps(batch.samples)
+        maps = {each: one for each, one in maps.items() if self._returning.takes(*one)}
         events = list[Event](MapReceived(grid) for grid, _ in maps.values())
-        for grid, at in maps.values():
-            self._returning.note(grid, at)
         map_at = {frame: at for frame, (_, at) in maps.items()}
         faults.extend(map(_size_fault, batch.oversized))
         self.refused |= {each.kind: str(_size_fault(each)) for each in batch.oversized}

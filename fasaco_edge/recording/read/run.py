@@ -6,6 +6,7 @@ Drawings are large: only their places in the files are kept, and each is read on
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -29,9 +30,11 @@ from fasaco_edge.recording.read.frames import (
     wall_ns,
 )
 from fasaco_edge.recording.read.robot_clock import RobotClock
-from fasaco_edge.recording.read.torn import HINT, open_part
+from fasaco_edge.recording.read.torn import DAMAGED_HINT, open_part
 from fasaco_edge.samples import BatchPlace, SampleDecoder, place_of
 
+# End of the name of a part without its suffix.
+PART_NUMBER = re.compile(r"-part\d+$")
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
 
 
@@ -94,7 +97,7 @@ class RecordedSamples:
             try:
                 samples = decoder.samples(batch.body)
             except MalformedMessage as error:
-                raise UnreadableRecording(f"{batch.path}: {error}", hint=HINT) from error
+                raise UnreadableRecording(f"{batch.path}: {error}", hint=DAMAGED_HINT) from error
             for numbered in samples:
                 # A part repeats the samples in force at its beginning.
                 if numbered.number < following:
@@ -176,7 +179,6 @@ class RunRecord:
     """Content of the parts of one run.
 
     Attributes:
-        recording_id: id of the run.
         parts: the files, by name.
         began_ns, ended_ns: first and last time on the timeline ``wall`` [ns].
         clock: converts times on that timeline to the robot's.
@@ -189,7 +191,6 @@ class RunRecord:
         batches: the samples, for ``RecordedSamples``.
     """
 
-    recording_id: str
     parts: tuple[PartFile, ...]
     began_ns: int
     ended_ns: int
@@ -199,6 +200,11 @@ class RunRecord:
     drawn: Mapping[str, Sequence[DrawingPlace]]
     anchor: NDArray[np.float64]
     batches: Sequence[SampleBatch]
+
+    @property
+    def name(self) -> str:
+        """Name of the recording: that of its first file, without the number of the part."""
+        return PART_NUMBER.sub("", Path(self.parts[0].path).stem)
 
 
 Progress = Callable[[int, int], None]
@@ -312,7 +318,6 @@ class _RunReader:
             else:
                 texts[entity] = [(at, str(value)) for at, value in rows]
         return RunRecord(
-            recording_id=next(iter(self.ids), ""),
             parts=tuple(self.parts),
             began_ns=began_ns,
             ended_ns=max(self.span, default=0),

@@ -29,6 +29,7 @@ LAST_KIND = 3
 MOST_ZEROS = 3
 _BLOCK = 65536
 HINT = "name the .rrd files that a recorder has written"
+DAMAGED_HINT = "the file is damaged: name the other parts of the run without it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +113,12 @@ def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
         with path.open("rb") as recording:
             scan = scan_recording(recording)
             if scan is None:
-                raise ValueError("this is no recording")
+                raise UnreadableRecording(f"{path}: this is no recording", hint=HINT)
             yield recording, scan
     except OSError as error:
         raise UnreadableRecording(f"{path}: {error.strerror or error}", hint=HINT) from error
     except (ValueError, MalformedMessage) as error:
-        raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
+        raise UnreadableRecording(f"{path}: {error}", hint=DAMAGED_HINT) from error
 
 
 def _end_of_data(recording: BinaryIO, total: int) -> int:

@@ -79,7 +79,7 @@ class PathDrawing:
         if about.changed is not None:
             x0, y0, x1, y1 = np.subtract(astuple(about.changed), anchor.xy * 2).tolist()
             box = draw.box_archetype((x0, y0, x1, y1), draw.WINDOW)
-            label = draw.label_archetype((x0, y0, x1, y1), about.reason)
+            label = draw.label_archetype((x0, y0, x1, y1), plain(about.reason))
         elif self._has_window:
             box = draw.line_archetype(np.zeros((0, 2)), draw.WINDOW)
             label = rr.Points3D(np.zeros((0, 3)))

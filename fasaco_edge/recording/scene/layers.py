@@ -68,7 +68,7 @@ def is_far_from(framed: Bounds, bounds: Bounds, share: float) -> bool:
 
 
 BURST_S = 60.0
-# Rates in the file [bytes/s].
+# Rates in the file [bytes per second of the robot's time].
 RATES = {
     entities.MAP: 3_000,
     entities.FLOOR: 1_000,

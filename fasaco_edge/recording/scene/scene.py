@@ -19,7 +19,13 @@ from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import OF_PATH, OF_PHEROMONE, OF_RECORDER, OF_STATUS, Curves
 from fasaco_edge.recording.scene.drawings import AreaDrawing, DrivenPathDrawing, PathDrawing
-from fasaco_edge.recording.scene.layers import Anchor, Layers, is_far_from, size_in_file
+from fasaco_edge.recording.scene.layers import (
+    RATES,
+    Anchor,
+    Layers,
+    is_far_from,
+    size_in_file,
+)
 from fasaco_edge.recording.scene.runcard import Outcome, RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
@@ -238,9 +244,11 @@ class Scene:
             return
         self._run = known
         self._describe()
-        radius_m = known_settings(status.config).robot.radius_m
-        if radius_m > 0:
-            self._draw_robot(radius_m)
+        settings = known_settings(status.config)
+        # A simulated robot sweeps faster than the recorder's clock runs.
+        self._layers.limit({layer: settings.pace * rate for layer, rate in RATES.items()})
+        if settings.robot.radius_m > 0:
+            self._draw_robot(settings.robot.radius_m)
 
     def _describe(self) -> None:
         card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")

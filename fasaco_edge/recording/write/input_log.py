@@ -20,6 +20,7 @@ from fasaco_edge.samples import Numbered, SampleEncoder
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, digest
 from fasaco_edge.wire.documents.rooms import Rooms
+from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.topics import RECORDED_INPUTS
@@ -54,6 +55,7 @@ class InputLog:
         self._kept: dict[str, tuple[object, int]] = {}
         self._late: dict[str, Arrival] = {}
         self._now_ns = (0, 0)
+        self._period_ns: float = STATUS_PERIOD_NS
 
     def add(self, arrival: Arrival) -> None:
         """Take a sample; ignore a topic that is not recorded."""
@@ -103,11 +105,17 @@ class InputLog:
         if topic not in ("status", "rooms"):
             return False
         try:
-            news = _status_news(arrival) if topic == "status" else _rooms_news(arrival)
+            if topic == "status":
+                status = decode_tolerant(arrival.sample.payload, Status)
+                # In the time of the robot, which may be simulated faster than life.
+                self._period_ns = STATUS_PERIOD_NS / known_settings(status.config).pace
+                news = _status_news(status)
+            else:
+                news = _rooms_news(arrival)
         except MalformedMessage:
             return False
         before, kept_ns = self._kept.get(topic, (None, 0))
-        if news == before and arrival.at_ns - kept_ns < STATUS_PERIOD_NS:
+        if news == before and arrival.at_ns - kept_ns < self._period_ns:
             self._late[topic] = arrival
             return False
         self._kept[topic] = news, arrival.at_ns
@@ -115,8 +123,7 @@ class InputLog:
         return True
 
 
-def _status_news(arrival: Arrival) -> object:
-    status = decode_tolerant(arrival.sample.payload, Status)
+def _status_news(status: Status) -> object:
     return (
         # The first status with a map shows that the mission has begun.
         *(status.state, status.map is not None, status.version, status.config),

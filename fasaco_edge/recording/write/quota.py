@@ -18,6 +18,7 @@ from pathlib import Path
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.durable import file_in_place_of
 
 MEGABYTE = 1_000_000
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
@@ -32,8 +33,10 @@ LOG = logging.getLogger(__name__)
 
 def cannot_record(folder: Path, error: OSError) -> BadConfiguration:
     """Return the error of a folder that cannot be read, made or written to."""
+    file = file_in_place_of(folder)
+    why = error.strerror or error if file is None else f"{file} is not a folder"
     return BadConfiguration(
-        f"cannot record into {folder}: {error.strerror or error}",
+        f"cannot record into {folder}: {why}",
         hint="name a folder that may be written to",
     )
 

@@ -7,7 +7,15 @@ from collections.abc import Iterator
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.figures import floor_words
-from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen, direction
+from fasaco_edge.review.instant import (
+    DRIVE_S,
+    MAP_S,
+    Instant,
+    MapThen,
+    PathThen,
+    PlanThen,
+    direction,
+)
 from fasaco_edge.review.orders import ordered_words
 from fasaco_edge.review.spot import SWEPT_BY_OTHERS, Spot
 from fasaco_edge.wire.documents.path_documents import Rectangle
@@ -74,6 +82,9 @@ def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
         moving = "" if instant.speed_m_s is None else f", {instant.speed_m_s:.2f} m/s"
         facing = direction(instant.yaw_deg)
         yield "robot", f"at ({instant.x:.2f}, {instant.y:.2f}) m, facing {facing}{moving}"
+    if instant.sweeps_m2 is not None and instant.sweeps_new_m2 is not None:
+        new = f"{instant.sweeps_new_m2:.2f} of {instant.sweeps_m2:.2f} m2 for the first time"
+        yield "sweeps", f"{new}, in the next {DRIVE_S:.0f} s"
     if (turn := instant.turn) is not None:
         side = "left" if turn.degrees > 0 else "right"
         span = f"{clock(turn.begin_s)} to {clock(turn.end_s)}"
@@ -125,7 +136,7 @@ def _map_words(change: MapThen, since: str) -> str:
         if m2
     ]
     if not parts or change.around is None:
-        return f"no change since {since}"
+        return f"no change in the {MAP_S:.0f} s before"
     return f"since {since} {', '.join(parts)}, {_box_words(change.around)}"
 
 

@@ -22,7 +22,7 @@ from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.floor_and_rooms import outlined
-from fasaco_edge.review.instant import InstantPicture
+from fasaco_edge.review.instant import DRIVE_S, InstantPicture
 from fasaco_edge.review.moments import refused_by_code
 from fasaco_edge.review.orders import ordered_words
 from fasaco_edge.review.output.answers import instant_rows, spot_rows
@@ -67,7 +67,7 @@ def draw_map(review: Review) -> Image.Image | None:
         lattice,
         track,
         visits,
-        title=f"{review.record.recording_id}: {DONE[review.complete]}",
+        title=f"{review.record.name}: {DONE[review.complete]}",
         lines=_caption(review),
         driven=driven,
         swept=MapLayer(floor.geometry, floor.swept) if floor and (is_line or others) else None,
@@ -79,9 +79,9 @@ def draw_map(review: Review) -> Image.Image | None:
     )
 
 
-# Period before and after a moment for which the driven track is drawn [s].
-AROUND_S = 10.0
 HEADING_M = 0.3
+# Distance of the number of a spot from its mark [m].
+NUMBER_M = 0.2
 
 
 def draw_instant(review: Review, shown: InstantPicture) -> Image.Image | None:
@@ -89,7 +89,7 @@ def draw_instant(review: Review, shown: InstantPicture) -> Image.Image | None:
     grid, lattice, instant, data = shown.grid, review.lattice, shown.instant, review.data
     if grid is None or lattice is None:
         return None
-    near = np.flatnonzero(np.abs(data.times - instant.at_s) <= AROUND_S)
+    near = np.flatnonzero(np.abs(data.times - instant.at_s) <= DRIVE_S)
     drive, driven = _thinned(data, slice(near[0], near[-1] + 1) if len(near) else slice(0))
     plot = Plot(PlotView.over(bounds_of(grid, lattice, drive), lattice.cell_m))
     plot.ground(grid)
@@ -115,8 +115,8 @@ def draw_instant(review: Review, shown: InstantPicture) -> Image.Image | None:
         plot.start_mark(place)
         plot.line(np.array([place, place + HEADING_M * along]), palette.INK, 4.0)
     lines = [*_simulated(review), *(f"{name}: {text}" for name, text in instant_rows(instant))]
-    bar = (f"{AROUND_S:.0f} s before", f"{AROUND_S:.0f} s after")
-    title = f"{review.record.recording_id} at {clock(instant.at_s)}"
+    bar = (f"{DRIVE_S:.0f} s before", f"{DRIVE_S:.0f} s after")
+    title = f"{review.record.name} at {clock(instant.at_s)}"
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
 
@@ -142,14 +142,24 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
         plot.line(gap, palette.ORANGE, 1.5)
     if gaps:
         key.append(KeyEntry("tile", palette.ORANGE, "no pose in between: does not count"))
-    for spot in spots:
+    for number, spot in enumerate(spots, 1):
         plot.end_mark(np.array([spot.x, spot.y]))
+        if len(spots) > 1:
+            plot.text(str(number), (spot.x + NUMBER_M, spot.y))
     key.append(KeyEntry("square", palette.END, "asked for"))
-    lines = _simulated(review)
-    lines += [f"{name}: {text}" for spot in spots for name, text in spot_rows(spot)]
-    title = f"{review.record.recording_id}: one spot"
+    lines = [*_simulated(review), *spot_lines(spots)]
+    title = f"{review.record.name}: {'one spot' if len(spots) == 1 else f'{len(spots)} spots'}"
     bar = ("0:00", clock(review.duration_s))
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
+
+
+def spot_lines(spots: Sequence[Spot]) -> list[str]:
+    """Return the lines of a caption about spots; several have the numbers of their marks."""
+    return [
+        f"{f'{number} ' * (len(spots) > 1)}{name}: {text}"
+        for number, spot in enumerate(spots, 1)
+        for name, text in spot_rows(spot)
+    ]
 
 
 def _simulated(review: Review) -> list[str]:

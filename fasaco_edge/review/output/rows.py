@@ -186,7 +186,8 @@ def _stood(document: ReviewDocument) -> str:
     if (stand := document.longest_stand) is None:
         return ""
     at = f"from {clock(stand.at_s)} at ({stand.x:.2f}, {stand.y:.2f})"
-    return f"longest {stand.seconds:.1f} s {at}: {', '.join(stand.states)}"
+    why = ", ".join([*stand.states, *filter(None, [plain(stand.reason)])])
+    return f"longest {stand.seconds:.1f} s {at}: {why}"
 
 
 def _times(document: ReviewDocument) -> str:

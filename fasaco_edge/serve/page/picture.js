@@ -115,9 +115,11 @@ function drawArea(context, polygon, colour, name, dashed, opacity = 0.14) {
   context.setLineDash([]);
   if (!name) return;
   // Below its upper edge, as rooms have their names in the middle.
-  const corners = polygon.map(([x, y]) => toScreen(x, y));
-  const middle = corners.reduce((sum, [px]) => sum + px, 0) / corners.length;
-  drawLabel(context, name, middle, Math.min(...corners.map(([, py]) => py)) + 11, colour);
+  const corners = polygon.map(([x, y]) => toScreen(x, y)), across = corners.map(([px]) => px);
+  const wide = Math.max(...across) - Math.min(...across);
+  const text = name === picked ? name : fitting(context, name, 1.3 * wide);
+  const middle = across.reduce((sum, px) => sum + px, 0) / across.length;
+  if (text) drawLabel(context, text, middle, Math.min(...corners.map(([, py]) => py)) + 11, colour);
 }
 
 const LABEL_FONT = "600 13px system-ui, sans-serif";

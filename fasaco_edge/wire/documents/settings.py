@@ -95,6 +95,11 @@ class KnownSettings(Document, frozen=True):
     fleet: FleetSettings = FleetSettings()
 
     @property
+    def pace(self) -> float:
+        """Factor of rates that count the robot's time: 1, or above for a faster simulation."""
+        return max(self.robot.time_scale, 1.0)
+
+    @property
     def cell_m(self) -> float:
         """Edge of a cell [m]; 0 if not sent."""
         overlap = 0.0 if self.planner.line == "cells" else self.robot.overlap

@@ -33,7 +33,7 @@ from fasaco_edge.wire.documents.replies import (
 )
 
 RECORDER_STATES: Final = ("recording", "disk full", "stalled", "stopping")
-SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting")
+SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting", "failed")
 CLAIMS: Final = ("looks", "waits", "yields", "plans")
 
 

@@ -213,7 +213,7 @@ def _people(building: Building, settings: LabSettings) -> dict[str, Any]:
 def _middle(building: Building) -> tuple[float, float, float, float]:
     """Return the middle half of what is known of a building, each way: x1, y1, x2, y2 [m]."""
     rows, cols = np.nonzero(~building.unknown)
-    (row0, row1), (col0, col1) = (np.quantile(axis, (0.25, 0.75)) for axis in (rows, cols))
+    (row0, row1), (col0, col1) = (np.quantile(axis, (0.25, 0.75)).tolist() for axis in (rows, cols))
     return (*building.geometry.to_map(col0, row0), *building.geometry.to_map(col1, row1))
 
 

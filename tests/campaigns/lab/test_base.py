@@ -67,6 +67,12 @@ def test_it_scans_walls_and_touches_them():
     assert base.truth.x == pytest.approx(4.0 - 0.17, abs=0.01)
 
 
+def test_people_walk_about_in_the_middle():
+    _, base = base_in(6.0, 6.0, people=2)
+    base.tick()
+    assert not base.touches
+
+
 def test_the_mapper_corrects_odometry_and_draws_the_hall():
     from tests.campaigns.lab.mapper import Mapper
 
