@@ -34,20 +34,10 @@ from fasaco_edge.grid.fine_raster import (
 )
 from fasaco_edge.grid.floor import StandLattice, states_of, tool_reach, tool_steps
 from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window
-from fasaco_edge.grid.lattice import (
-    UNKNOWN,
-    Cell,
-    CoverageLattice,
-    Footprint,
-    placement_of,
-)
+from fasaco_edge.grid.lattice import UNKNOWN, Cell, CoverageLattice, Footprint, placement_of
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.floor.bits import WORD, Bits, packed, unpacked
-from fasaco_edge.kernels.floor.places import (
-    disc_rows,
-    keep_in_cells,
-    places_of,
-)
+from fasaco_edge.kernels.floor.places import disc_rows, keep_in_cells, places_of
 from fasaco_edge.kernels.lattice.footprint import Placement
 
 # The raster spans whole chunks of this many pixels of the map: for a map of 5 cm pixels 3.2 m.

@@ -7,7 +7,7 @@ Distances are timed at the robot's speed, turns by their angle.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,14 +20,7 @@ from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
 from fasaco_edge.kernels.floor.polish import polish
 from fasaco_edge.kernels.floor.reorder import reorder
 from fasaco_edge.kernels.floor.seconds import chain_s
-from fasaco_edge.kernels.floor.sweeps import (
-    BLOCK,
-    COLUMNS,
-    NEVER,
-    Scratch,
-    Sweeps,
-    sweep_edges,
-)
+from fasaco_edge.kernels.floor.sweeps import BLOCK, COLUMNS, NEVER, Scratch, Sweeps, sweep_edges
 from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
 from fasaco_edge.kernels.lattice.polygons import BITS
 
@@ -245,33 +238,6 @@ class LineSearch:
     def _rank(self, line: DrivenLine) -> tuple[float, float]:
         price = 0.0 if self._config.swept is not None else self._config.price_s_m2
         return self._missing_m2(line.swept_m2), line.cost_s(price)
-
-
-def line_over(
-    walk: NDArray[np.int32],
-    stands: StandLattice,
-    floor: Floor,
-    config: LineConfig,
-    *,
-    is_end_fixed: bool,
-    stop: Callable[[], bool] = lambda: True,
-) -> DrivenLine:
-    """Return the line along a walk.
-
-    Args:
-        walk: int32 (n, 2), cells (row, col), each a step from the previous one.
-        stands: the lattice of the walk.
-        floor: the floor to sweep.
-        config: prices.
-        is_end_fixed: whether the line must end where the walk does.
-        stop: ends the search once there is a line.
-    """
-    search = LineSearch(walk, stands, floor, config, is_end_fixed=is_end_fixed)
-    for _ in search.run():
-        if search.best is not None and stop():
-            break
-    assert search.best is not None
-    return search.best
 
 
 def _sweeps(floor: Floor) -> Sweeps:

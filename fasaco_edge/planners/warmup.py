@@ -31,7 +31,7 @@ from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.curves import curve_along
-from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
+from fasaco_edge.planners.line import LineConfig, LineSearch, memory_for_moves
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.planner import SearchProgress, ignore, never
@@ -163,7 +163,8 @@ def _take_line(room: TinyRoom) -> None:
     floor = Floor.around(room.grid, discs, (0.5, 0.5))
     stands = StandLattice.over(floor, 1.0)
     walk = np.array([(0, 0), (0, 1), (1, 1)], np.int32)
-    line_over(walk, stands, floor, LineConfig(moves_m2=20), is_end_fixed=False)
+    search = LineSearch(walk, stands, floor, LineConfig(moves_m2=20), is_end_fixed=False)
+    assert any(search.best is not None for _ in search.run())
     under_maps = FloorMap(room.grid, room.lattice, room.footprint, discs, 100_000)
     shape = under_maps.geometry.rows, under_maps.geometry.cols
     under_maps.reached(np.zeros(room.lattice.states.shape, np.bool_), Window(0, 0, *shape))

@@ -90,7 +90,7 @@ def plan(building: str, truth: OccupancyGrid, start: tuple[float, float], case: 
     from fasaco_edge.grid.lattice import CoverageLattice, Footprint
     from fasaco_edge.kernels.floor.turning import proportional_turning
     from fasaco_edge.planners.cost import CoverageCost, SearchWork
-    from fasaco_edge.planners.line import LINES, line_over
+    from fasaco_edge.planners.line import LINES, LineSearch
     from fasaco_edge.planners.planner import WorkLimit
     from fasaco_edge.planners.problem import CoverageProblem
     from fasaco_edge.planners.search.near_optimal import NearOptimal
@@ -110,7 +110,8 @@ def plan(building: str, truth: OccupancyGrid, start: tuple[float, float], case: 
     path = NearOptimal().plan(problem, limit)
     config = replace(LINES[case], speed_m_s=SPEED_M_S, turning=proportional_turning(TURN_S))
     began = time.process_time()
-    line = line_over(path.cells, stands, floor, config, is_end_fixed=False)
+    search = LineSearch(path.cells, stands, floor, config, is_end_fixed=False)
+    line = next(search.best for _ in search.run() if search.best is not None)
     ms = 1e3 * (time.process_time() - began)
     judged = _judged(building, case, truth, line.xy, start)
     return replace(judged, line_ms_m2=ms / line.reachable_m2)

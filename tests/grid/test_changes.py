@@ -15,14 +15,7 @@ from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch
 from tests.grid.test_lattice import known_cells
 from tests.support.examples import examples
-from tests.support.grids import (
-    displaced,
-    footprints,
-    grid,
-    occupancy_grids,
-    part_of,
-    repainted,
-)
+from tests.support.grids import displaced, footprints, grid, occupancy_grids, part_of, repainted
 
 CELL = Footprint(0.3, 0.12)
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fasaco_edge.errors import MapTooLarge, StartBlocked, StartOutsideMap
-from fasaco_edge.grid.fine_raster import RobotDiscs
+from fasaco_edge.grid.fine_raster import PolygonsOnRaster, RobotDiscs
 from fasaco_edge.grid.floor import Floor, StandLattice, straightened
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.floor.bits import unpacked
 
@@ -130,3 +131,44 @@ def test_points_on_the_straight_way_are_left_out():
     line = np.array([(0, 0), (0, 0), (0, 1), (0, 2), (0, 1), (3, 1), (3, 1)], float)
     assert straightened(line).tolist() == [[0, 0], [0, 2], [0, 1], [3, 1]]
     assert straightened(line[:2]).tolist() == [[0, 0]]
+
+
+# Which pixels of a raster many polygons touch: what each touches alone, near by or not.
+
+
+ROWS, COLS = 120, 170
+
+
+def polygons_of(count, seed=0):
+    """Triangles and rectangles all over a raster of 6 m x 8.5 m, and beyond it."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for number in range(count):
+        x, y, width, height = [*rng.uniform(-3.0, 10.0, 2), *rng.choice([0.05, 0.3, 0.61], 2)]
+        corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height)]
+        found.append(tuple(corners[: 3 + number % 2]))
+    return found
+
+
+@pytest.mark.parametrize("origin", [Pose2D(0.0, 0.0), Pose2D(-0.7, 0.31, 0.4)])
+def test_several_polygons_touch_the_union_of_their_cells(origin):
+    geometry, whole = GridGeometry(ROWS, COLS, 0.05, origin), Window(0, 0, ROWS, COLS)
+    polygons = polygons_of(60)
+    expected = np.zeros((ROWS, COLS), bool)
+    for polygon in polygons:
+        expected |= PolygonsOnRaster.of([polygon], geometry).touched(whole)
+    assert expected.any()
+    together = PolygonsOnRaster.of(polygons, geometry)
+    for part in (whole, Window(40, 0, 41, COLS), Window(7, 100, 90, 131)):
+        assert np.array_equal(together.touched(part), expected[part.slices_in(whole)])
+
+
+def test_the_work_depends_on_the_polygons_near_a_part():
+    """Each part looked at each of two thousand: three seconds for these."""
+    geometry = GridGeometry(ROWS, COLS, 0.05, Pose2D(100.0, 0.0))
+    far = PolygonsOnRaster.of(polygons_of(2000), geometry)
+    far.touched(Window(0, 0, 9, 9))
+    started = time.thread_time()
+    for row in range(100):
+        assert not far.touched(Window(row, 0, row + 20, COLS)).any()
+    assert time.thread_time() - started < 0.5

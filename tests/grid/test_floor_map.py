@@ -1,7 +1,5 @@
 """The floor under a map that changes is, after each change, that of the new map alone."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -18,6 +16,7 @@ from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.floor.bits import unpacked
 from tests.grid.test_floor import room
+from tests.support.grids import cropped
 
 FOOTPRINT = Footprint(cell_m=0.276, robot_radius_m=0.18)
 DISCS = RobotDiscs(radius_m=0.18, tool_m=0.3)
@@ -27,13 +26,6 @@ PLENTY = 10**6
 def over(grid, keep_out=()):
     plain = CoverageLattice.from_map(grid, FOOTPRINT)
     return FloorMap(grid, plain, FOOTPRINT, DISCS, PLENTY, keep_out)
-
-
-def part_of(grid, row0, col0, row1, col1):
-    x, y = grid.geometry.to_map(col0, row0)
-    origin = Pose2D(x, y, grid.geometry.origin.yaw)
-    geometry = GridGeometry(row1 - row0, col1 - col0, grid.geometry.resolution, origin)
-    return OccupancyGrid(geometry, grid.cells[row0:row1, col0:col1].copy())
 
 
 def assert_same(found, expected):
@@ -78,7 +70,7 @@ def test_changes_lead_where_a_new_look_does(yaw, chunk, clearance_m, monkeypatch
     monkeypatch.setattr(f"{__name__}.DISCS", replace(DISCS, clearance_m=clearance_m))
     rng = np.random.default_rng(7)
     whole = room(6.0, 5.0, yaw)
-    known = part_of(whole, 3, 4, 90, 99)
+    known = cropped(whole, 3, 4, 90, 99)
     floor, plain = over(known), CoverageLattice.from_map(known, FOOTPRINT)
     seen = 0
     for number in range(24):
@@ -86,7 +78,7 @@ def test_changes_lead_where_a_new_look_does(yaw, chunk, clearance_m, monkeypatch
             most = 8 if number % 4 else 35
             low, high = rng.integers(0, most, 2), rng.integers(0, most, 2)
             cells = whole.cells.copy()
-            new = part_of(OccupancyGrid(whole.geometry, cells), *low, *(cells.shape - high))
+            new = cropped(OccupancyGrid(whole.geometry, cells), *low, *(cells.shape - high))
         else:
             cells = known.cells.copy()
             for row, col in rng.integers(0, min(cells.shape), (int(rng.integers(1, 3)), 2)):
@@ -135,11 +127,11 @@ def test_how_an_origin_is_rounded_makes_no_difference(cell_m):
 def test_a_map_that_grows_a_little_keeps_its_raster():
     """Else all that lies on the raster would move with each map."""
     whole = room(3.0, 2.0)
-    known = part_of(whole, 10, 35, 20, 45)  # in rows 29 and columns 74 of the raster
+    known = cropped(whole, 10, 35, 20, 45)  # in rows 29 and columns 74 of the raster
     floor = over(known)
     blocked, geometry = floor.blocked, floor.geometry
     for by in range(1, 8):
-        grown = part_of(whole, 10 - by, 35 - by, 20 + by, 45 + by)
+        grown = cropped(whole, 10 - by, 35 - by, 20 + by, 45 + by)
         floor.change((known, grown), CoverageLattice.from_map(grown, FOOTPRINT))
         assert floor.shift == (0, 0)
         assert floor.geometry == geometry
@@ -154,7 +146,7 @@ def test_a_map_that_grows_by_unknown_pixels_touches_little():
     cells = np.pad(whole.cells, 60, constant_values=-1)
     x, y = whole.geometry.to_map(-60, -60)
     grown = OccupancyGrid(GridGeometry(*cells.shape, 0.05, Pose2D(x, y, 0.0)), cells)
-    known = part_of(grown, 50, 50, *cells.shape)
+    known = cropped(grown, 50, 50, *cells.shape)
     floor, plain = over(known), CoverageLattice.from_map(grown, FOOTPRINT)
     floor.change((known, grown), plain)
     assert floor.touched is None

@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.grid.geometry import RASTER_STEPS, GridGeometry, Pose2D, Window
-from tests.support.grids import on_raster
+from fasaco_edge.grid import occupancy
+from fasaco_edge.grid.geometry import RASTER_STEPS, GridGeometry, Pose2D, Window, union_bounds
+from fasaco_edge.grid.occupancy import known_bounds
+from tests.support.grids import grid, on_raster
 
 METRES = st.floats(-1e3, 1e3)
 SIDES = st.integers(-20, 20)
@@ -110,8 +112,7 @@ def test_grids_that_differ_by_whole_pixels_lie_on_one_raster(
 
 
 @pytest.mark.parametrize(
-    "other",
-    [Pose2D(0.012, 0.0), Pose2D(0.0, -0.0021), Pose2D(0.0, 0.0, 1e-3)],
+    "other", [Pose2D(0.012, 0.0), Pose2D(0.0, -0.0021), Pose2D(0.0, 0.0, 1e-3)]
 )
 def test_grids_that_differ_otherwise_do_not(other):
     geometry = GridGeometry(5, 6, 0.05, Pose2D(0.0, 0.0))
@@ -134,3 +135,20 @@ def test_slices_pick_a_window_out_of_an_array(inner, outer):
 
 def test_a_window_is_rounded_outward_to_chunks():
     assert Window(5, 8, 9, 12).in_chunks(4, 10, 40) == Window(4, 8, 10, 12)
+
+
+@pytest.mark.parametrize("block", [1, 12, 1_000_000])
+def test_known_bounds_follow_the_map_when_it_is_turned(monkeypatch, block):
+    monkeypatch.setattr(occupancy, "BLOCK_PIXELS", block)
+    cells = np.full((4, 6), -1)
+    cells[1:3, 2:5] = 0
+    assert known_bounds(grid(cells)) == pytest.approx((0.2, 0.1, 0.5, 0.3))
+    assert known_bounds(grid(cells, yaw=math.pi / 2)) == pytest.approx((-0.3, 0.2, -0.1, 0.5))
+    assert known_bounds(grid(np.full((4, 6), -1))) is None
+
+
+def test_union_holds_all_parts():
+    assert union_bounds() is union_bounds(None) is None
+    assert union_bounds(None, (0.0, 0.0, 1.0, 1.0)) == (0.0, 0.0, 1.0, 1.0)
+    one, other = (0.0, -1.0, 1.0, 1.0), (-2.0, 0.0, 0.5, 3.0)
+    assert union_bounds(one, other) == (-2.0, -1.0, 1.0, 3.0)

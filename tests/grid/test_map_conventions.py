@@ -1,7 +1,5 @@
 """Map files whose keys contradict their images: what is made of them, and what is said."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PIL import Image

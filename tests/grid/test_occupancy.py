@@ -50,8 +50,7 @@ def test_patches_lie_one_over_the_other():
 
 
 @pytest.mark.parametrize(
-    "window",
-    [Window(0, 0, 5, 5), Window(-1, 0, 1, 1), Window(3, 4, 4, 6), Window(9, 9, 10, 10)],
+    "window", [Window(0, 0, 5, 5), Window(-1, 0, 1, 1), Window(3, 4, 4, 6), Window(9, 9, 10, 10)]
 )
 def test_a_patch_that_reaches_beyond_the_map_is_refused(window):
     with pytest.raises(PatchWithoutBase, match="does not lie inside the map of 4 x 5 cells"):

@@ -1,7 +1,5 @@
 """The floor that the tool would reach if walls were thinner than the map shows them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

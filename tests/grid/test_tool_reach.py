@@ -1,7 +1,5 @@
 """A tool wider than the robot reaches nothing through walls, on the floor map and for the judge."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

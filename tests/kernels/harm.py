@@ -107,5 +107,5 @@ MISDEEDS: dict[str, Callable[[Path], None]] = {
 }
 # For root alone to try.
 TAKEN: dict[str, Callable[[Path], None]] = {
-    "of another user": lambda file: os.chown(file, NOBODY, NOBODY),
+    "of another user": lambda file: os.chown(file, NOBODY, NOBODY)
 }

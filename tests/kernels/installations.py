@@ -67,6 +67,11 @@ class Told:
     warnings: list[str]
     folder: str | None
 
+    @property
+    def work(self) -> tuple[int, int, list[str]]:
+        """All but the folder."""
+        return self.loaded, self.compiled, self.warnings
+
 
 PATIENCE_S = 300.0
 COMPILES = {"COMPILES": "1"}

@@ -14,12 +14,7 @@ from fasaco_edge.kernels.floor.bits import packed, spread, unpacked
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.line import MOST_CAPSULES
 from fasaco_edge.kernels.floor.places import connected, disc_rows, places_of, within
-from fasaco_edge.kernels.floor.sweeps import (
-    COLUMNS,
-    NEVER,
-    Scratch,
-    Sweeps,
-)
+from fasaco_edge.kernels.floor.sweeps import COLUMNS, NEVER, Scratch, Sweeps
 from tests.support.examples import examples
 from tests.support.inner import entry
 

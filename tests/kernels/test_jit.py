@@ -62,8 +62,7 @@ def test_a_moved_installation_loads_the_code_of_the_same_sources(compiled, tmp_p
     compiled.root = tmp_path / "moved"
     for source in compiled.root.rglob("*.py"):
         os.utime(source, (1, 1))
-    told = compiled.tell()
-    assert (told.loaded, told.compiled, told.warnings) == ALL_LOADED
+    assert compiled.tell().work == ALL_LOADED
 
 
 def test_code_for_other_types_is_kept_for_one_process(compiled, tmp_path, monkeypatch):
@@ -71,7 +70,7 @@ def test_code_for_other_types_is_kept_for_one_process(compiled, tmp_path, monkey
     before = sorted((file.name, file.stat().st_mtime_ns) for file in compiled.folder.iterdir())
     for _ in range(2):
         told = compiled.tell("seven.tell(1.5)", env={"TMPDIR": str(tmp)})
-        assert (told.loaded, told.compiled, told.warnings) == (0, 2, [])
+        assert told.work == (0, 2, [])
     after = sorted((file.name, file.stat().st_mtime_ns) for file in compiled.folder.iterdir())
     assert after == before
     assert list(tmp.iterdir()) == []
@@ -113,16 +112,18 @@ assert parsed() is not None
 
 
 def test_a_loaded_kernel_is_called_by_one_compiled_later(compiled):
-    told = compiled.tell(f"{PACKED}{CALLS_IT}\nseven.tell()")
-    assert (told.loaded, told.compiled, told.warnings) == (2, 0, [])
+    assert compiled.tell(f"{PACKED}{CALLS_IT}\nseven.tell()").work == (2, 0, [])
 
 
 def test_other_types_are_added_by_who_compiles(compiled):
-    told = compiled.tell("seven.noted.stages.clear(); seven.tell(1.5)", env=COMPILES)
-    assert (told.loaded, told.compiled, told.warnings) == (0, 2, [])
+    assert compiled.tell("seven.noted.stages.clear(); seven.tell(1.5)", env=COMPILES).work == (
+        0,
+        2,
+        [],
+    )
     for code in ("seven.tell()", "seven.tell(1.5)"):
         told = compiled.tell(code)
-        assert (told.loaded, told.compiled, told.warnings) == ALL_LOADED
+        assert told.work == ALL_LOADED
 
 
 def test_a_function_in_a_file_that_is_not_named_is_not_kept(installed):

@@ -1,7 +1,5 @@
 """Nearest-neighbour walks over the parts of robots."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Floor that is still to sweep, against a slow count."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -85,13 +85,7 @@ def test_perturbations_leave_a_sound_walk_and_remember_the_best(
     search = set_up(task, prices, len(task.walk) + room)
     ground, walk, _, tally, memory, colony = search
     rules = rules_for(
-        prices,
-        radius,
-        5,
-        loops_of_256,
-        limit,
-        strict=strict,
-        ants_of_256=ants_of_256,
+        prices, radius, 5, loops_of_256, limit, strict=strict, ants_of_256=ants_of_256
     )
     random = stream(seed)
     seen = [walk.counts[COST]]

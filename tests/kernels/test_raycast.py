@@ -7,12 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.lattice.raycast import (
-    Scanner,
-    cast_rays,
-    disc_is_free,
-    reveal_disc,
-)
+from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 from tests.support.examples import examples
 
 FREE_AT_MOST = 25

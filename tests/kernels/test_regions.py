@@ -22,14 +22,7 @@ from fasaco_edge.kernels.local_search.regions import (
     cut_walk,
     put_back,
 )
-from fasaco_edge.kernels.local_search.walk_array import (
-    COST,
-    FIXED,
-    FRAME,
-    LENGTH,
-    Ground,
-    recount,
-)
+from fasaco_edge.kernels.local_search.walk_array import COST, FIXED, FRAME, LENGTH, Ground, recount
 from tests import naive
 from tests.kernels.grounds import (
     PRICES,

@@ -1,7 +1,5 @@
 """Words lead to their goals, and no other way of arcs and straights is shorter."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

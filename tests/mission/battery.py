@@ -16,12 +16,16 @@ POLICY = BatteryPolicy()
 class Battery(Drive):
     """A robot whose battery says once a tick how full it is."""
 
-    def __init__(self, level, cell=(0, 0), order_state=None, battery=POLICY, rows=ROOM, **policy):
+    def __init__(
+        self, level, cell=(0, 0), order_state=None, battery=POLICY, rows=ROOM, drain=0, **policy
+    ):
         at = (-1, -1) if "#" in rows[0] else (0, 0)
         config = replace(with_policy(CONFIG, **{"dock": DOCK} | policy), battery=battery)
         self.level, self.power = level, "discharging"
         events = MapReceived(building(*rows, at=at)), pose_at(*cell)
         super().__init__(cell, *events, config=config, order_state=order_state)
+        # As if it had been seen to drain so much a second.
+        self.mission.charging.gauge._drains.extend([drain] * 5 if drain else [])
 
     def tell(self, *events, after=1.0):
         heard = [] if self.level is None else [BatteryReceived(self.level, self.power)]

@@ -1,7 +1,5 @@
 """A share of the floor that is asked for: returns for what is missing, and when they end."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -15,7 +13,7 @@ from fasaco_edge.mission.line.asked_share import LEAST_GAIN, LEAST_M2, RAISED, A
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.line import LINES
 from tests.mission.offset_base import small_flat
-from tests.mission.test_line import CONFIG, Robot
+from tests.mission.test_line import CONFIG, Robot, robot_on
 from tests.mission.test_room_orders import BOTH, LOOKS, PERIOD_S
 from tests.mission.world import building, with_policy
 
@@ -119,9 +117,8 @@ def test_the_same_order_given_again_begins_anew():
 def test_rooms_in_turn_are_all_covered_before_it_returns():
     line = replace(LINES["quick"], swept=0.99)
     sweeping = replace(CONFIG.sweeping, line=line)
-    robot = Robot(Mission(with_policy(replace(CONFIG, sweeping=sweeping), by_room="always")))
-    robot.at = 1.3, 1.3
-    robot.tell(MapReceived(building(*BOTH)))
+    config = with_policy(replace(CONFIG, sweeping=sweeping), by_room="always")
+    robot = robot_on(building(*BOTH), at=(1.3, 1.3), config=config)
     for _ in range(LOOKS):
         robot.now += 1.01 * PERIOD_S
         robot.tell()

@@ -6,9 +6,9 @@ import pytest
 from fasaco_edge.errors import LedgerMismatchError
 from fasaco_edge.mission.events import MapReceived, State
 from tests.mission.line_robot import LineRobot
-from tests.mission.test_other_building import FLOOR, HERE, NEW, OLD, stand, swept
+from tests.mission.test_other_building import FLOOR, NEW, OLD, stand, swept
 from tests.mission.test_reached_cells import START, two_rooms
-from tests.mission.world import Drive, building
+from tests.mission.world import building
 
 BLANK = {letter: MapReceived(building(*(letter * 14,) * 12)) for letter in "#?"}
 WAITS = "waits for a map or a pose that puts it on free ground"
@@ -56,8 +56,7 @@ def test_a_map_without_floor_decides_no_doubt(letter):
 def test_after_a_restart_a_map_without_floor_contradicts_nothing(letter):
     before = swept(*FLOOR, ticks=60)
     covered = before.visited
-    drive = Drive(HERE)
-    drive.mission.restore(before.mission.snapshot(), before.mission.order_state)
+    drive = before.restarted()
     assert stand(drive, 8.0, BLANK[letter]) == []
     assert stand(drive, 8.0, OLD) == []
     assert covered <= drive.visited

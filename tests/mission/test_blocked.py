@@ -1,7 +1,5 @@
 """A robot whose follower meets what the map does not show: it sweeps elsewhere, and comes back."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -11,9 +9,11 @@ import pytest
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.config import MissionPolicy
-from fasaco_edge.mission.events import FollowerBlocked, PatchReceived
+from fasaco_edge.mission.events import CommandReceived, FollowerBlocked, PatchReceived
 from fasaco_edge.mission.map.obstacles import CLOSED_S, WIDEN_AFTER_S, Obstacles
+from fasaco_edge.mission.orders.order import read_order
 from tests.mission.line_robot import CONFIG, RADIUS_M, LineRobot, map_of
+from tests.support.rooms import FREE, WALL, fill, room
 
 # Distance that the follower keeps from things [m].
 MARGIN_M = 0.06
@@ -23,19 +23,9 @@ START = (0.6, 0.6)
 TRIES_AGAIN = replace(CONFIG, policy=MissionPolicy(lost_pose_s=0.0))
 
 
-def room(cols=80):
-    """A room of 3 m x 4 m."""
-    pixels = np.full((60, cols), 100, np.int8)
-    pixels[1:59, 1 : cols - 1] = 0
-    return pixels
-
-
-def two_rooms():
-    """Two rooms with a door of 0.8 m between them."""
-    pixels = room(120)
-    pixels[:, 60:62] = 100
-    pixels[22:38, 60:62] = 0
-    return pixels
+ROOM = room(4.0, 3.0)
+# Two rooms with a door of 0.8 m between them.
+TWO_ROOMS = fill(fill(room(6.0, 3.0), 3.0, 0.0, 3.1, 3.0, WALL), 3.0, 1.1, 3.1, 1.9, FREE)
 
 
 class SeeingRobot(LineRobot):
@@ -92,7 +82,7 @@ def codes(robot):
 
 
 def test_it_sweeps_the_place_of_a_person_later():
-    robot = SeeingRobot(room(), START, disc(2.0, 1.5))
+    robot = SeeingRobot(ROOM, START, disc(2.0, 1.5))
     assert robot.wait(400.0, lambda robot: robot.held_s >= HELD_S)
     assert robot.wait(3.0, lambda robot: "blocked" in codes(robot))
     assert robot.mission.state == "degraded"
@@ -106,7 +96,7 @@ def test_it_sweeps_the_place_of_a_person_later():
 
 
 def test_a_lasting_obstacle_is_left_out_and_reported():
-    robot = SeeingRobot(two_rooms(), START, closed_door())
+    robot = SeeingRobot(TWO_ROOMS, START, closed_door())
     assert robot.wait(1500.0, lambda robot: robot.mission.state == "done")
     assert "not reached" in robot.mission.reason
     assert "%" in robot.mission.reason
@@ -117,7 +107,7 @@ def test_a_lasting_obstacle_is_left_out_and_reported():
 
 
 def test_a_door_that_opens_is_driven_through():
-    robot = SeeingRobot(two_rooms(), START, closed_door())
+    robot = SeeingRobot(TWO_ROOMS, START, closed_door())
     assert robot.wait(400.0, lambda robot: robot.held_s >= HELD_S)
     robot.wait(30.0, lambda robot: False)
     robot.hidden = []
@@ -128,7 +118,7 @@ def test_a_door_that_opens_is_driven_through():
 
 
 def test_a_path_that_cannot_be_joined_is_rebuilt_from_the_robot():
-    robot = LineRobot(room(), START)
+    robot = LineRobot(ROOM, START)
     assert robot.wait(60.0, lambda robot: robot.x > 1.0 or robot.y > 1.0)
     robot.is_stuck = True
     robot.wait(3.0, lambda robot: False)
@@ -145,7 +135,7 @@ def test_a_path_that_cannot_be_joined_is_rebuilt_from_the_robot():
 
 
 def test_a_report_of_another_path_or_frame_closes_nothing():
-    robot = LineRobot(room(), START)
+    robot = LineRobot(ROOM, START)
     ahead = ((1.0, 1.0),)
     maps = robot.mission.map.map_revision
     robot.step(FollowerBlocked(999, "obstacle ahead", 5.0, "map", robot.x, robot.y, ahead))
@@ -188,15 +178,52 @@ def test_a_map_that_is_too_large_to_be_kept_twice_stays_as_it_is(monkeypatch):
 
 def test_updates_come_on_the_map_without_obstacles():
     """What was drawn on it is gone once the floor is open again."""
-    robot = LineRobot(room(), START)
+    robot = LineRobot(ROOM, START)
     revision, here = robot.mission.route.revision, (robot.x, robot.y)
     robot.step(FollowerBlocked(revision, "obstacle", 5.0, "map", *here, ((2.0, 2.0),)))
     closed = robot.mission.coverage().coverable
     patch = MapPatch(Window(50, 70, 52, 72), np.full((2, 2), 100, np.int8))
     robot.step(PatchReceived(patch))
-    assert np.count_nonzero(robot.mission.grid.cells != room()) == 4
+    assert np.count_nonzero(robot.mission.grid.cells != ROOM) == 4
     robot.wait(CLOSED_S, lambda robot: False)
-    assert np.count_nonzero(robot.mission.grid.cells != room()) == 4
+    assert np.count_nonzero(robot.mission.grid.cells != ROOM) == 4
     assert robot.mission.lattice.coverable.sum() > closed - 4
-    rows, cols = np.nonzero(robot.mission.map.grid.cells != room())
+    rows, cols = np.nonzero(robot.mission.map.grid.cells != ROOM)
     assert (set(rows), set(cols)) == ({50, 51}, {70, 71})
+
+
+# What a follower meets says nothing of the building.
+
+
+def all_round(robot):
+    """A follower that says it meets something wherever it looks."""
+    angles = np.linspace(0.0, 6.2, 20).tolist()
+    points = tuple((robot.x + 0.4 * math.cos(a), robot.y + 0.4 * math.sin(a)) for a in angles)
+    return FollowerBlocked(0, "obstacle", 5.0, "map", robot.x, robot.y, points)
+
+
+def test_a_robot_that_is_crowded_keeps_its_ledger():
+    robot = LineRobot(TWO_ROOMS, (1.0, 1.0))
+    robot.wait(45.0, lambda _: False)
+    covered = robot.mission.covered.current.total
+    for _ in range(1000):
+        robot.step(*([all_round(robot)] if robot.path and round(10 * robot.now) % 10 == 0 else []))
+        assert robot.mission.covered.current.total >= covered, robot.mission.reason
+        assert "another building" not in robot.mission.reason
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    assert robot.mission.coverage().remaining == 0
+
+
+def test_an_order_that_begins_in_a_crowd_is_not_done_in_it():
+    robot = LineRobot(TWO_ROOMS, (1.0, 1.0))
+    robot.wait(30.0, lambda _: False)
+    robot.step(all_round(robot))
+    for tick in range(700):
+        robot.step(*([all_round(robot)] if robot.path and tick % 10 == 0 else []))
+    order = read_order({"return_home": True})
+    robot.step(CommandReceived(1, "start", order, discard=True))
+    for tick in range(600):
+        robot.step(*([all_round(robot)] if robot.path and tick % 10 == 0 else []))
+        assert robot.mission.state != "done"
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    assert robot.mission.coverage().remaining == 0

@@ -15,15 +15,16 @@ from fasaco_edge.mission.map.frame_selector import PATIENCE_S
 from fasaco_edge.mission.orders.mask import inline_grid, inline_mask, mask_polygons
 from fasaco_edge.mission.orders.order import ConfiguredZone, read_order
 from fasaco_edge.mission.orders.zones import with_kept_out
-from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
     CELL,
     CONFIG,
     PIXELS,
-    Drive,
     building,
+    cells,
+    idle,
     pose_at,
     rectangle,
+    robot_in,
     with_policy,
 )
 
@@ -33,13 +34,7 @@ COLUMN = tuple(tuple(at) for at in rectangle(2, 2, 4, 4))
 
 
 def drive_with(**policy):
-    events = MapReceived(building(*ROOM)), pose_at(0, 0)
-    config = with_policy(CONFIG, **policy)
-    return Drive((0, 0), *events, config=config, order_state=OrderState.idle("waits"))
-
-
-def cells_of(row0, col0, row1, col1):
-    return {(row, col) for row in range(row0, row1) for col in range(col0, col1)}
+    return idle(*ROOM, config=with_policy(CONFIG, **policy))
 
 
 def mask_file(folder, marked, resolution=CELL / PIXELS, origin=(0.0, 0.0, 0.0)):
@@ -60,7 +55,7 @@ def test_an_order_covers_a_zone_by_its_name():
     kept = drive.mission.order_state.order
     by_corners = read_order({"zones": [{"name": "kitchen", "polygon": KITCHEN.polygon}]})
     assert kept == by_corners
-    assert cells_of(0, 6, 3, 9) <= drive.visited
+    assert cells(0, 6, 3, 9) <= drive.visited
 
 
 def test_configured_keep_out_zones_apply_to_each_order():
@@ -68,13 +63,13 @@ def test_configured_keep_out_zones_apply_to_each_order():
     drive.command("start")
     drive.finish()
     # The disc touches the zone in the cells around it as well.
-    assert not set(drive.driven) & cells_of(2, 2, 4, 4)
+    assert not set(drive.driven) & cells(2, 2, 4, 4)
     first = set(drive.driven)
     other = [list(at) for at in rectangle(0, 5, 1, 6)]
     drive.command("start", {"keep_out": [other]})
     drive.finish()
     again = set(drive.driven) - first
-    assert not again & (cells_of(2, 2, 4, 4) | cells_of(0, 5, 1, 6))
+    assert not again & (cells(2, 2, 4, 4) | cells(0, 5, 1, 6))
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4])
@@ -116,7 +111,7 @@ def test_a_mask_of_another_frame_than_the_maps_stops_the_robot(lattice_deg):
     """In coordinates of another map it would keep out of other places, and not of its own."""
     mask = inline_grid(building("##", at=(2, 2)), 65)
     config = replace(with_policy(CONFIG, keep_out_mask=mask), lattice_deg=lattice_deg)
-    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0), config=config)
+    drive = robot_in(*ROOM, config=config)
     # Askew, the room has few cells and unseen floor beside them: first the robot looks around.
     for seconds in (LOOK_S + 1.0, 2.0):
         drive.tell(after=seconds)

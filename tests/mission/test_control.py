@@ -5,14 +5,16 @@ import pytest
 from fasaco_edge.daemon.loop.mission_reports import zone_progress
 from fasaco_edge.errors import OrderError
 from fasaco_edge.mission.events import MapReceived, State
-from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
+    IDLE,
     Drive,
-    answer,
     building,
+    cells,
+    idle,
     patch,
     pose_at,
     rectangle,
+    robot_in,
     started,
 )
 
@@ -21,32 +23,8 @@ WEST, EAST = rectangle(0, 0, 6, 2), rectangle(0, 6, 6, 8)
 TWO_ZONES = {"zones": [{"name": "east", "polygon": EAST}, {"name": "west", "polygon": WEST}]}
 
 
-def cells(row0, col0, row1, col1):
-    return {(row, col) for row in range(row0, row1) for col in range(col0, col1)}
-
-
-def idle(*rows, cell=(0, 0)):
-    """A robot that waits for an order."""
-    events = MapReceived(building(*rows)), pose_at(*cell)
-    return Drive(cell, *events, order_state=OrderState.idle("no order yet"))
-
-
-def follow(drive, ticks=600):
-    """Drive until the mission is done; return the states it was in, in order."""
-    states = []
-    for _ in range(ticks):
-        if not states or states[-1] != drive.mission.state:
-            states.append(drive.mission.state)
-        if drive.mission.state is State.DONE:
-            return states
-        if drive.request is not None:
-            drive.plan()
-        drive.go()
-    raise AssertionError(f"not done: {drive.mission.state}, {drive.mission.reason}")
-
-
 def test_without_an_order_it_stands_with_that_reason():
-    drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
+    drive = Drive((0, 0), order_state=IDLE)
     assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "no order yet")
     drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
     assert drive.mission.state is State.IDLE
@@ -60,7 +38,7 @@ def test_zones_are_covered_one_after_the_other_and_nothing_else():
     drive = idle(*ROOM)
     assert drive.command("start", TWO_ZONES).plan.reason == "zone 'east'"
     assert drive.request.problem.cells == 12
-    follow(drive)
+    drive.finish()
     reasons = [update.reason for update in drive.updates]
     assert reasons == ["zone 'east'", "zone 'west'", "every reachable cell of the zones is covered"]
     assert cells(0, 6, 6, 8) | cells(0, 0, 6, 2) <= drive.visited
@@ -92,26 +70,24 @@ def test_an_order_covers_all_again_unless_it_says_otherwise():
     drive.finish()
     assert drive.command("start").plan.problem.cells == 47
     drive.plan()
-    for _ in range(20):
-        drive.go()
+    drive.go(times=20)
     drive.command("cancel")
     covered = len(drive.visited)
     assert drive.command("start", {"keep_covered": True}).plan.problem.cells == 48 - covered
-    follow(drive)
+    drive.finish()
 
 
 def test_cells_behind_a_keep_out_are_not_blamed_on_obstacles():
     drive = idle("........", "...#....")
     drive.command("start", {"keep_out": [rectangle(0, 4, 2, 5)]})
-    follow(drive)
+    drive.finish()
     found = {(area.reason, area.cells) for area in drive.mission.orders.uncovered.found().areas}
     assert found == {("in a keep-out zone", 2), ("closed off by a keep-out zone", 6)}
 
 
 def test_paused_it_stands_and_still_counts_what_it_passes_over():
     drive = started(*ROOM)
-    for _ in range(5):
-        drive.go()
+    drive.go(times=5)
     decision = drive.command("pause")
     assert decision.path.cells.shape == (0, 2)
     assert (drive.mission.state, drive.mission.reason) == (State.PAUSED, "paused by command")
@@ -131,8 +107,7 @@ def test_paused_it_stands_and_still_counts_what_it_passes_over():
 
 def test_resume_without_a_change_keeps_the_path():
     drive = started(*ROOM)
-    for _ in range(5):
-        drive.go()
+    drive.go(times=5)
     ahead, plans = drive.walk[:], drive.mission.route.requests.plans
     drive.command("pause")
     drive.tell(pose_at(*drive.cell), MapReceived(building(*ROOM)), after=60.0)
@@ -145,8 +120,7 @@ def test_resume_without_a_change_keeps_the_path():
 
 def test_resume_repairs_the_path_where_the_map_changed():
     drive = started(*ROOM)
-    for _ in range(5):
-        drive.go()
+    drive.go(times=5)
     ahead = drive.walk[:]
     drive.command("pause")
     drive.tell(patch("#", at=ahead[-1]))
@@ -176,20 +150,17 @@ def test_another_order_after_a_pause_is_planned_from_nothing():
 
 
 def test_a_plan_for_the_order_before_is_not_driven():
-    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
-    stale = answer(drive.request)
+    drive = robot_in(*ROOM)
     assert drive.command("start", TWO_ZONES).plan is None, "one plan at a time"
-    drive.request = None
-    decision = drive.tell(stale)
+    decision = drive.plan()
     assert decision.path is None
     assert decision.plan.reason == "zone 'east'"
-    follow(drive)
+    drive.finish()
 
 
 def test_cancel_stops_drops_the_order_and_keeps_the_coverage():
     drive = started(*ROOM)
-    for _ in range(5):
-        drive.go()
+    drive.go(times=5)
     decision = drive.command("cancel")
     assert decision.path.cells.shape == (0, 2)
     assert not decision.forgotten
@@ -201,8 +172,7 @@ def test_cancel_stops_drops_the_order_and_keeps_the_coverage():
 
 def test_reset_forgets_what_is_covered_too():
     drive = started(*ROOM)
-    for _ in range(5):
-        drive.go()
+    drive.go(times=5)
     decision = drive.command("reset")
     assert decision.forgotten
     assert decision.path.cells.shape == (0, 2)
@@ -210,7 +180,7 @@ def test_reset_forgets_what_is_covered_too():
     assert drive.visited == {drive.cell}, "the tool lies there"
     assert drive.tell().forgotten is False
     drive.command("start")
-    follow(drive)
+    drive.finish()
 
 
 def test_a_command_may_come_before_any_map():
@@ -221,7 +191,7 @@ def test_a_command_may_come_before_any_map():
     drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
     assert drive.mission.state is State.PAUSED
     assert drive.command("resume").plan.problem.cells == 12
-    follow(drive)
+    drive.finish()
 
 
 def test_a_zone_beyond_the_map_is_refused_and_changes_nothing():
@@ -239,7 +209,7 @@ def test_a_zone_beyond_the_map_is_refused_and_changes_nothing():
 def test_a_started_mission_stays_done_when_the_map_changes():
     drive = idle(*ROOM[:2])
     drive.command("start")
-    follow(drive)
+    drive.finish()
     assert drive.tell(MapReceived(building(*ROOM))).plan is None
     assert drive.mission.state is State.DONE
     assert drive.command("start").plan is not None
@@ -248,18 +218,9 @@ def test_a_started_mission_stays_done_when_the_map_changes():
 def test_unknown_parts_of_a_zone_are_named():
     drive = idle("..??", "..??")
     drive.command("start", {"zones": [{"name": "all", "polygon": rectangle(0, 0, 2, 4)}]})
-    follow(drive)
+    drive.finish()
     (area,) = drive.mission.orders.uncovered.found().areas
     assert (area.cells, area.reason) == (4, "unknown to the map")
-
-
-def resumed(drive, cell, *rows):
-    """What comes after a kill -9: all that was kept, and nothing else."""
-    kept = drive.mission.snapshot()
-    again = Drive(cell, order_state=OrderState.from_json(kept.note))
-    again.mission.restore(kept)
-    again.tell(MapReceived(building(*rows)), pose_at(*cell))
-    return again
 
 
 @pytest.mark.parametrize("driven", [3, 14, 30, 45])
@@ -267,15 +228,11 @@ def test_order_zone_pass_and_home_outlive_the_daemon(driven):
     order = {"zones": [{"name": "west", "polygon": WEST, "passes": 2}], "return_home": True}
     first = idle(*ROOM, cell=(3, 4))
     first.command("start", order)
-    for _ in range(driven):
-        if first.request is not None:
-            first.plan()
-        first.go()
+    first.tick(times=driven)
     before = first.mission.order_state
-    again = resumed(first, first.cell, *ROOM)
+    again = first.restarted(MapReceived(building(*ROOM)), pose_at(*first.cell))
     assert again.mission.order_state == before
-    if again.mission.state is not State.DONE:
-        follow(again)
+    again.finish()
     assert again.cell == (3, 4)
     # Each cell twice in all, but what was covered in the pass is not covered again.
     assert len(first.driven) + len(again.driven) < 2 * 12 + 30
@@ -292,8 +249,7 @@ def test_how_far_each_zone_is():
         seen.append(zones)
         if drive.mission.state is State.DONE:
             break
-        drive.plan() if drive.request else None
-        drive.go()
+        drive.tick()
     assert seen[0] == [(1, 12, 0), (0, 12, 0)]
     assert seen[-1] == [(2, 12, 12), (2, 12, 12)]
     for east, west in seen:
@@ -323,27 +279,18 @@ class Mapper:
         return MapReceived(building(*seen[::-1]))
 
 
-def explore(drive, mapper, ticks=600):
-    for _ in range(ticks):
-        if drive.mission.state is State.DONE:
-            return
-        if drive.request is not None:
-            drive.plan()
-        drive.go(mapper.event(drive.walk[0] if drive.walk else drive.cell))
-    raise AssertionError(f"not done: {drive.mission.state}, {drive.mission.reason}")
-
-
 HOUSE = ("....#.......", "....#.####..", "....#.#..#..", "......#.....", "....#.#..#..")
 
 
 def test_an_unseen_zone_is_searched_for():
     mapper = Mapper(*HOUSE)
-    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), order_state=OrderState.idle("none"))
+    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), order_state=IDLE)
     # Through the door in the middle, around the corner, and in from behind.
     decision = drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(0, 7, 3, 9)}]})
     assert decision.plan.reason == "looking for a way to zone 'a'"
     assert drive.request.problem.cells == 1
-    explore(drive, mapper)
+    while drive.mission.state is not State.DONE and drive.now < 60.0:
+        drive.tick(mapper.event(drive.walk[0] if drive.walk else drive.cell))
     assert cells(0, 7, 3, 9) <= drive.visited
     assert drive.mission.orders.uncovered.found().areas == ()
     assert not drive.visited & {(3, 0), (4, 0), (4, 1)}, "the rest of the house was not asked for"

@@ -1,7 +1,5 @@
 """Missions of a base that cannot turn on the spot: its paths are curves just ahead of it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

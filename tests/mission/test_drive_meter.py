@@ -1,7 +1,5 @@
 """What a robot's poses show of its driving, beside the limits that it was simulated with."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -8,6 +8,8 @@ import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.mission.coverage.driven_poses import Driven, DrivenPoses
+from fasaco_edge.mission.coverage.segments import SHORT_M, beside_m, corner_between
+from fasaco_edge.mission.coverage.steady_track import Position
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from tests.mission.line_robot import CONFIG, SPEED_M_S, TOOL_M, LineRobot
 
@@ -87,3 +89,54 @@ def test_a_robot_faster_than_configured_sweeps_where_it_is_alone():
 def test_without_speed_or_stamps_all_poses_count(speed_m_s, every_s):
     found = taken(0.0, 3.0, 0.1, speed_m_s=speed_m_s, every_s=every_s)
     assert [len(each) for each in found] == [1, 1, 1]
+
+
+# How far a robot may have driven beside the segment between two places.
+
+
+FAR_M = 100.0
+
+
+def between(end, yaws, farthest_m=FAR_M):
+    """The places at the origin and at ``end``, with its headings there."""
+    return Position(0.0, 0.0, 0.0, 0.0, yaws[0]), Position(*end, 0.0, farthest_m, yaws[1])
+
+
+@pytest.mark.parametrize("yaws", [(0.0, 0.0), (0.0, 1.0), (-0.5, 0.0)])
+def test_a_turn_beside_a_straight_drive_is_on_the_spot(yaws):
+    assert beside_m(*between((1.0, 0.0), yaws)) == 0.0
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.7])
+def test_a_corner_between_two_places_lies_no_farther_beside_them(share):
+    """It came along x to the corner at (share, 0), and went on along y."""
+    end = share, 1.0 - share
+    height = share * (1.0 - share) / math.hypot(*end)
+    assert beside_m(*between(end, (0.0, 0.5 * math.pi))) == pytest.approx(height)
+
+
+def test_an_arc_lies_within():
+    away = beside_m(*between((math.sin(0.5), 1.0 - math.cos(0.5)), (0.0, 0.5)))
+    assert 1.0 - math.cos(0.25) < away < 0.2
+
+
+def test_it_was_no_farther_away_than_it_can_have_driven():
+    there_and_back = (1.0, 0.0), (2.0, 2.0)
+    far_m = 0.5 * math.sqrt(FAR_M**2 - 1.0)
+    for farthest_m, away_m in ((FAR_M, far_m), (1.25, 0.375), (0.5, math.inf)):
+        assert beside_m(*between(*there_and_back, farthest_m)) == pytest.approx(away_m)
+
+
+def test_unknown_speed_or_near_poses_mean_a_straight_drive():
+    for end, farthest_m in (((1.0, 0.0), 0.0), ((SHORT_M, 0.0), FAR_M)):
+        assert beside_m(*between(end, (1.0, 1.0), farthest_m)) == 0.0
+
+
+def test_headings_tell_where_it_turned():
+    end, right_angle = (0.6, 0.5), (0.0, 0.5 * math.pi)
+    assert corner_between(*between(end, right_angle)) == pytest.approx((0.6, 0.0))
+    # It cannot have driven round that corner in the time.
+    assert corner_between(*between(end, right_angle, 1.0)) is None
+    # Headings to one side, or against each other, are no single turn of a base that drives ahead.
+    for yaws in ((1.0, 1.0), (0.0, math.pi), (math.pi, 0.0)):
+        assert corner_between(*between(end, yaws)) is None

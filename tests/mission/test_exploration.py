@@ -11,13 +11,13 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.events import MapReceived, PatchReceived, State
-from fasaco_edge.mission.work.order_state import OrderState
 from tests import naive
 from tests.mission.world import (
     FOOTPRINT,
     PIXELS,
     Drive,
     building,
+    idle,
     patch,
     placed,
     pose_at,
@@ -153,9 +153,7 @@ def test_walls_that_come_and_go_never_lead_to_an_illegal_step(seed, pace):
     ],
 )
 def test_the_area_of_an_unreached_zone_is_reported(wall, col0, col1, area):
-    drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
-    rows = (f"...#{wall}#...",) * 2
-    drive.tell(MapReceived(building(*rows)), pose_at(0, 0))
+    drive = idle(*(f"...#{wall}#...",) * 2)
     zones = [
         {"name": "here", "polygon": rectangle(0, 0, 2, 2)},
         {"name": "there", "polygon": rectangle(0, col0, 2, col1)},
@@ -166,19 +164,16 @@ def test_the_area_of_an_unreached_zone_is_reported(wall, col0, col1, area):
 
 
 def test_a_zone_covered_before_its_door_shut_is_not_named():
-    drive = Drive((0, 8), order_state=OrderState.idle("no order yet"))
-    drive.tell(MapReceived(building("." * 9)), pose_at(0, 8))
+    drive = idle("." * 9, cell=(0, 8))
     zones = [
         {"name": "a", "polygon": rectangle(0, 6, 1, 9)},
         {"name": "b", "polygon": rectangle(0, 0, 1, 3)},
     ]
     drive.command("start", {"zones": zones})
     for _ in range(100):
-        if drive.request is not None:
-            drive.plan()
         if drive.cell == (0, 3):
             break
-        drive.go()
+        drive.tick()
     drive.tell(patch("#", at=(0, 4)))
     drive.finish()
     assert drive.mission.reason == "every reachable cell of the zones is covered"
@@ -192,20 +187,12 @@ def test_a_restarted_mapper_hides_no_floor_of_an_order(over):
     whole = building(wall, f"#{'.' * 12}#", wall)
     drive = Drive((1, 1), MapReceived(whole), pose_at(1, 1))
     while len(drive.visited) < 9:
-        if drive.request is not None:
-            drive.plan()
-        drive.go()
+        drive.tick()
     if over:
         drive.finish()
-    kept = drive.mission.snapshot()
-    order = OrderState.from_json(kept.note)
-    again = Drive((1, 1), order_state=order)
-    again.mission.restore(kept, order)
-    again.tell(MapReceived(seen), pose_at(1, 1))
-    for _ in range(20):
-        if again.request is not None:
-            again.plan()
-        again.go()
+    drive.cell = 1, 1
+    again = drive.restarted(MapReceived(seen), pose_at(1, 1))
+    again.tick(times=20)
     # An order that was over is not begun again for this.
     assert again.cell == ((1, 1) if over else (1, 8))
     assert (again.mission.state is State.DONE) is over
@@ -220,14 +207,8 @@ def test_a_restart_on_the_same_map_explores_no_border():
     seen = building(wall, "#........     ", wall)
     drive = Drive((1, 8), MapReceived(seen), pose_at(1, 8))
     while len(drive.visited) < 5:
-        if drive.request is not None:
-            drive.plan()
-        drive.go()
-    kept = drive.mission.snapshot()
-    order = OrderState.from_json(kept.note)
-    again = Drive(drive.cell, order_state=order)
-    again.mission.restore(kept, order)
-    again.tell(MapReceived(seen), pose_at(*drive.cell))
+        drive.tick()
+    again = drive.restarted(MapReceived(seen), pose_at(*drive.cell))
     again.finish()
     assert len(again.visited) == 8
     assert (1, 8) not in again.driven

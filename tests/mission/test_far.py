@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fasaco_edge.errors import MapTooFar
-from fasaco_edge.grid.geometry import FARTHEST_M, MOST_INDEX, GridGeometry, Pose2D, StampedPose
+from fasaco_edge.grid.geometry import FARTHEST_M, MOST_INDEX, GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.events import MapReceived, PoseReceived, State
-from tests.mission.world import CELL, CONFIG, Drive, building
+from fasaco_edge.mission.events import MapReceived, State
+from tests.mission.world import CELL, CONFIG, Drive, building, pose_at
 
 # Easting and northing of a place in Germany, and the largest northing there is [m].
 UTM = [(500_000.0, 5_500_000.0), (833_000.25, 9_999_990.5), (-19_999_000.0, 19_999_000.0)]
@@ -25,7 +25,7 @@ def test_a_far_building_is_covered_as_one_at_zero(place):
     row, col = cells_of(place)
     near, far = Drive((1, 1)), Drive((row + 1, col + 1))
     for drive, at in ((near, (0, 0)), (far, (row, col))):
-        drive.tell(MapReceived(building(*ROOM, at=at)), pose_in(drive.cell))
+        drive.tell(MapReceived(building(*ROOM, at=at)), pose_at(*drive.cell))
         drive.plan()
     walk = near.mission.route.path.cells
     assert np.array_equal(far.mission.route.path.cells, walk + np.array((row, col)))
@@ -35,11 +35,6 @@ def test_a_far_building_is_covered_as_one_at_zero(place):
         far.go()
     assert far.mission.state is State.DONE
     assert far.mission.coverage().covered == near.mission.coverage().coverable
-
-
-def pose_in(cell):
-    row, col = cell
-    return PoseReceived(StampedPose(Pose2D((col + 0.5) * CELL, (row + 0.5) * CELL)))
 
 
 @pytest.mark.parametrize("place", UTM)
@@ -77,16 +72,6 @@ def test_a_lattice_too_far_from_zero_is_refused(x, y, cell_m):
     grid = OccupancyGrid(geometry, np.zeros((3, 3), np.int8))
     with pytest.raises(MapTooFar, match=r"a lattice from \(.*\) m, of cells of .* reaches beyond"):
         CoverageLattice.from_map(grid, Footprint(cell_m, cell_m / 2))
-
-
-def test_a_map_too_far_away_leaves_the_one_before():
-    drive = Drive((1, 1))
-    drive.tell(MapReceived(building(*ROOM)), pose_in((1, 1)))
-    drive.plan()
-    far = building(*ROOM, at=cells_of((FARTHEST_M, 0.0)))
-    (fault,) = drive.tell(MapReceived(far)).faults
-    assert isinstance(fault, MapTooFar)
-    drive.finish()
 
 
 def test_the_state_says_that_the_only_map_was_refused():

@@ -1,5 +1,8 @@
 """A ledger from before a restart: taken over where the map does not speak against it."""
 
+import time
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -7,12 +10,15 @@ from fasaco_edge.errors import LedgerMismatchError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
-from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.coverage.fit import Fit, Verdict
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.coverage.loop_closure import Motion
 from fasaco_edge.mission.events import Decision, MapReceived, State
+from fasaco_edge.mission.map.building_watch import FOREIGN, Agreement
 from tests.mission.world import Drive, building, pose_at, started
+from tests.support.grids import seen_around
 
 MAPS = ("office", "flat", "basement", "walled_grid", "warehouse")
 ROBOT = Footprint(0.3, 0.18)
@@ -43,10 +49,7 @@ def from_its_start(name):
 
 def seen_within(grid, reach_m):
     """What a mapper knows that was just switched on."""
-    pixels = np.argwhere(np.ones(grid.cells.shape, bool)) + 0.5
-    x, y = grid.geometry.to_map(pixels[:, 1], pixels[:, 0])
-    far = (np.hypot(x, y) > reach_m).reshape(grid.cells.shape)
-    return OccupancyGrid(grid.geometry, np.where(far, UNKNOWN, grid.cells).astype(np.int8))
+    return seen_around(grid, (0.0, 0.0), reach_m)
 
 
 def covered_all(grid):
@@ -124,8 +127,7 @@ def resumed(before, cell, *events):
 
 def test_a_mission_continues_where_it_stopped():
     first = started(*HALL, cell=(1, 1))
-    for _ in range(60):
-        first.go()
+    first.go(times=60)
     again = resumed(after(first), first.cell, MapReceived(building(*HALL)), pose_at(*first.cell))
     assert again.visited == first.visited
     assert again.mission.covered.current.total == first.mission.covered.current.total
@@ -147,8 +149,7 @@ def test_a_finished_mission_stays_finished():
 
 def test_a_restarted_mapper_keeps_the_ledger():
     first = started(*HALL, cell=(1, 1))
-    for _ in range(60):
-        first.go()
+    first.go(times=60)
     small = building("...", "...", at=(1, 1))
     again = resumed(after(first), (1, 1), MapReceived(small), pose_at(1, 1))
     assert again.decisions[-1].faults == ()
@@ -174,3 +175,52 @@ def test_another_building_is_reported_and_covered_from_zero():
     assert again.mission.covered.current.frame == "map"
     # It is asked once.
     assert again.tell(MapReceived(building(*HALL))).faults == ()
+
+
+# How well two maps agree, and what of that makes them maps of two buildings.
+
+
+def lattice(grid):
+    return CoverageLattice.from_map(grid, ROBOT)
+
+
+def test_maps_without_a_difference_agree_fully():
+    assert Agreement(0, (0, 0), 0).kappa == Agreement(100, (0, 0), 0).kappa == 1.0
+
+
+@pytest.mark.parametrize("reach_m", [3.5, 8.0, 100.0])
+def test_two_buildings_agree_by_chance_alone(buildings, reach_m):
+    for one, other in permutations(MAPS, 2):
+        seen = lattice(seen_within(buildings[other], reach_m))
+        found = Agreement.of(lattice(buildings[one]), seen)
+        assert found.kappa < FOREIGN
+        assert not found.is_close
+
+
+@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize("reach_m", [2.0, 3.5, 100.0])
+@pytest.mark.parametrize("by_m", [0.1, 0.3])
+def test_a_building_agrees_with_itself(buildings, name, reach_m, by_m):
+    """Also if the map lies a cell aside."""
+    seen = lattice(seen_within(moved(buildings[name], by_m, 0.0), reach_m))
+    assert Agreement.of(lattice(buildings[name]), seen).kappa > FOREIGN
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_a_map_that_has_moved_agrees_once_it_is_moved_back(buildings, name):
+    before, after = lattice(buildings[name]), lattice(moved(buildings[name], 1.2, -0.9))
+    motion = Motion(Pose2D(0.0, 0.0), Pose2D(1.2, -0.9))
+    assert Agreement.of(before, after).kappa < FOREIGN
+    found = Agreement.of(before, after, motion)
+    assert found.kappa == pytest.approx(1.0)
+    assert found.known > 0.9 * np.count_nonzero(after.states)
+
+
+def test_maps_of_a_million_pixels_are_compared_in_milliseconds():
+    cells = np.where(np.random.default_rng(0).random((1000, 1000)) < 0.02, 100, 0).astype(np.int8)
+    grid = OccupancyGrid(GridGeometry(1000, 1000, 0.05, Pose2D(0.0, 0.0)), cells)
+    before = CoverageLattice.from_map(grid, Footprint(0.1, 0.05))
+    started = time.thread_time()
+    for _ in range(10):
+        assert Agreement.of(before, before).is_close
+    assert (time.thread_time() - started) / 10 < 0.005

@@ -14,19 +14,10 @@ MAP, ODOM = MapReceived(building(*HALL)), MapReceived(building(*HALL, frame="odo
 HERE, THERE = pose_at(1, 1), pose_at(1, 1, frame="odom")
 
 
-def restarted(first, *events):
-    """A mission that goes on from what another one covered."""
-    drive = Drive((1, 1))
-    drive.mission.restore(first.mission.snapshot())
-    drive.tell(*events)
-    return drive
-
-
 @pytest.fixture
 def driven():
     drive = started(*HALL, cell=(1, 1))
-    for _ in range(6):
-        drive.go()
+    drive.go(times=6)
     return drive
 
 
@@ -40,7 +31,7 @@ def told_for(drive, seconds, *events):
 
 def test_a_single_map_in_another_frame_changes_nothing(driven):
     """As it comes from a tf prefix, or from SLAM that was started with other parameters."""
-    again = restarted(driven, ODOM)
+    again = driven.restarted(ODOM)
     assert again.mission.state is State.WAITING_FOR_MAP
     assert again.mission.reason == (
         "no map in frame 'map' yet, in which progress is kept: the newest is in 'odom'"
@@ -91,7 +82,7 @@ def test_the_state_says_which_frame_is_where():
 
 
 def test_progress_is_set_aside_only_once_it_is_certain(driven):
-    again = restarted(driven, ODOM, THERE)
+    again = driven.restarted(ODOM, THERE)
     faults = told_for(again, PATIENCE_S - 1.5, ODOM, THERE)
     assert {type(fault) for fault in faults} == {WrongFrame}
     assert again.mission.snapshot().cells == driven.mission.snapshot().cells
@@ -119,13 +110,13 @@ def test_a_pose_in_the_frame_that_counts_keeps_it(driven):
 
 
 def test_a_pose_in_the_frame_of_the_progress_keeps_the_progress(driven):
-    again = restarted(driven, ODOM)
+    again = driven.restarted(ODOM)
     told_for(again, 2.0 * PATIENCE_S, THERE, HERE)
     assert again.mission.snapshot().cells == driven.mission.snapshot().cells
 
 
 def test_single_poses_do_not_change_the_frame(driven):
-    again = restarted(driven, ODOM)
+    again = driven.restarted(ODOM)
     for _ in range(4):
         again.tell(THERE, after=PATIENCE_S + 1.0)
     assert again.mission.snapshot().cells == driven.mission.snapshot().cells
@@ -146,7 +137,7 @@ def test_a_mapper_restarted_in_another_frame_takes_over(driven):
 
 @pytest.mark.parametrize("wedge", [(ODOM,), (ODOM, THERE), (ODOM, HERE), (MAP, THERE)])
 def test_a_reset_gets_out_of_every_state(driven, wedge):
-    again = restarted(driven, *wedge)
+    again = driven.restarted(*wedge)
     again.command("reset")
     assert again.mission.snapshot().cells <= 1
     again.command("start")
@@ -167,7 +158,7 @@ def test_after_a_reset_the_next_map_and_pose_decide_in_any_order(driven, order):
 
 
 def test_updates_go_to_the_map_of_their_frame(driven):
-    again = restarted(driven, ODOM)
+    again = driven.restarted(ODOM)
     (fault,) = again.tell(patch("#", at=(2, 2), frame="odom")).faults
     assert isinstance(fault, WrongFrame)
     told_for(again, PATIENCE_S + 2.0, THERE)

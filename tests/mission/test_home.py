@@ -8,14 +8,16 @@ from msgspec import structs
 
 from fasaco_edge.mission.config import Dock, Place
 from fasaco_edge.mission.events import MapReceived, State
-from fasaco_edge.mission.work.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState, Stage
 from tests.mission.world import (
     CELL,
     CONFIG,
-    Drive,
     building,
+    idle,
     patch,
     pose_at,
+    robot_in,
+    started,
     with_policy,
 )
 
@@ -25,17 +27,9 @@ HOME = Place(x_m=0.5 * CELL, y_m=5.5 * CELL, yaw_deg=90.0)
 DOCK = Dock(x_m=6.5 * CELL, y_m=5.5 * CELL, approach_m=2 * CELL)
 
 
-def robot(cell=(0, 0), order_state=None, **policy):
-    config = with_policy(CONFIG, **policy)
-    events = MapReceived(building(*ROOM)), pose_at(*cell)
-    return Drive(cell, *events, config=config, order_state=order_state)
-
-
 def covering(steps=5, **policy):
-    drive = robot(**policy)
-    drive.plan()
-    for _ in range(steps):
-        drive.go()
+    drive = started(*ROOM, config=with_policy(CONFIG, **policy))
+    drive.go(times=steps)
     return drive
 
 
@@ -61,6 +55,7 @@ def test_it_drives_home_and_resume_continues_the_order(policy, there):
     drive = covering(**policy)
     decision = drive.command("home")
     assert (decision.path.reason, drive.mission.state) == ("drives home", State.RETURNING)
+    assert decision.path.end_yaw == {(0, 0): None, (5, 0): math.pi / 2, (5, 4): 0.0}[there]
     arrive(drive)
     assert (drive.cell, drive.walk) == (there, [])
     assert (drive.mission.state, drive.mission.reason) == (
@@ -97,13 +92,6 @@ def test_it_continues_at_the_nearer_end_of_the_rest():
     assert len(drive.visited) == 48
 
 
-def test_the_way_home_ends_with_the_heading_of_that_place():
-    drive = covering(home=HOME)
-    assert drive.command("home").path.end_yaw == math.pi / 2
-    drive = covering()
-    assert drive.command("home").path.end_yaw is None
-
-
 def test_paused_on_the_way_home_it_stops_and_resumed_drives_home():
     drive = covering(20)
     drive.command("home")
@@ -127,15 +115,14 @@ def test_after_a_reset_home_is_where_the_next_order_begins():
     drive.command("reset")
     drive.command("start")
     drive.plan()
-    for _ in range(8):
-        drive.go()
+    drive.go(times=8)
     drive.command("home")
     arrive(drive)
     assert drive.cell == began != (0, 0)
 
 
 def test_without_a_home_the_command_is_refused():
-    drive = robot(order_state=OrderState.idle("no order yet"))
+    drive = idle(*ROOM)
     drive.command("home")
     assert str(drive.refused) == "there is no home yet"
 
@@ -171,7 +158,7 @@ def test_a_robot_carried_off_its_way_finds_another():
 
 
 def test_an_order_ends_at_home():
-    drive = robot((3, 3), OrderState.idle("no order yet"), home=HOME)
+    drive = idle(*ROOM, cell=(3, 3), config=with_policy(CONFIG, home=HOME))
     drive.command("start", {"return_home": True})
     drive.plan()
     drive.finish()
@@ -185,7 +172,7 @@ def test_the_errand_survives_a_restart():
     kept = OrderState.from_json(note)
     assert replace(kept, reached=None) == drive.mission.order_state
     assert drive.mission.order_state.errand == "home"
-    again = robot(drive.cell, OrderState.from_json(note))
+    again = robot_in(*ROOM, cell=drive.cell, order_state=OrderState.from_json(note))
     assert again.mission.state is State.RETURNING
 
 
@@ -197,7 +184,7 @@ def test_an_order_without_an_errand_is_readable_by_older_daemons():
 @pytest.mark.parametrize("how", ["home", "return_home"])
 def test_a_path_cut_off_by_a_map_behind_it_is_replaced_at_once(how):
     """Its own cell is blocked, the one beside it is not, and no way leads home from there."""
-    drive = Drive((0, 0), MapReceived(building("............")), pose_at(0, 0))
+    drive = robot_in("............")
     drive.finish()
     if how == "home":
         drive.command("home")
@@ -215,3 +202,69 @@ def test_a_path_cut_off_by_a_map_behind_it_is_replaced_at_once(how):
     assert drive.mission.reason == "no way home: waits for a map that shows one"
     assert decision.path is not None
     assert drive.walk == []
+
+
+# Floor out of reach as the robot sets out for home, and opens while it is on its way.
+
+
+# Home is in the small room.
+ROOMS = ("...#......", "...#......", "..........", "...#......")
+DOOR = (1, 3)
+START = (0, 9)
+SMALL_ROOM = Place(x_m=0.5 * CELL, y_m=0.5 * CELL)
+SHUT, OPEN = patch("#", at=DOOR), patch(".", at=DOOR)
+
+
+def returning(retries=2, rows=ROOMS):
+    """A robot that sets out for home while the door is shut."""
+    config = with_policy(CONFIG, home=SMALL_ROOM, retries=retries, retry_s=5.0)
+    drive = idle(*rows, cell=START, config=config)
+    drive.command("start", {"return_home": True})
+    drive.tell(SHUT)
+    assert until(drive, lambda: drive.mission.order_state.stage is Stage.RETURNING)
+    return drive
+
+
+def until(drive, holds, ticks=400):
+    for _ in range(ticks):
+        if holds():
+            return True
+        drive.tick()
+    return holds()
+
+
+def ends(drive):
+    return until(drive, lambda: drive.mission.order_state.stage is Stage.OVER)
+
+
+@pytest.mark.parametrize("retries", [0, 2])
+def test_a_way_home_that_opens_leads_over_the_floor_left(retries):
+    drive = returning(retries)
+    until(drive, lambda: drive.now > 60.0)
+    assert drive.mission.reason == "no way home: waits for a map that shows one"
+    drive.tell(OPEN)
+    assert ends(drive)
+    assert drive.mission.reason.startswith("every reachable cell is covered")
+    assert drive.cell == (0, 0)
+
+
+def test_a_narrow_opening_does_not_turn_the_robot_back():
+    drive = returning(rows=("##########", *ROOMS))
+    drive.tell(patch("......", at=(4, 4)))
+    until(drive, lambda: drive.now > 60.0)
+    assert drive.mission.order_state.stage is Stage.RETURNING
+
+
+def test_a_door_that_opens_repeatedly_does_not_delay_the_end():
+    drive = returning()
+    turned = 0
+    for _ in range(10):
+        if not until(drive, lambda: drive.mission.order_state.stage is Stage.RETURNING):
+            break
+        drive.tell(OPEN, after=5.0)
+        turned += drive.mission.order_state.stage is Stage.RETRYING
+        drive.tell(SHUT)
+    assert turned == 3
+    drive.tell(OPEN)
+    assert ends(drive)
+    assert "left over" in drive.mission.reason

@@ -1,7 +1,5 @@
 """Places that keep the robot out of nothing, or lie beside the map: they are named."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np
@@ -16,7 +14,7 @@ from fasaco_edge.mission.orders.mask import inline_grid, inline_mask
 from fasaco_edge.mission.work.idle_places import PERIOD_S, IdlePlaces
 from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.test_configured_zones import mask_file
-from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, rectangle, with_policy
+from tests.mission.world import CELL, CONFIG, building, rectangle, robot_in, with_policy
 from tests.support.processes import slowness
 
 ROOM = ("#########",) * 3 + ("#.......#",) * 4 + ("#########",)
@@ -31,8 +29,7 @@ MILLIMETRES = tuple((1e3 * x, 1e3 * y) for x, y in INSIDE)
 
 
 def drive_with(**policy):
-    events = MapReceived(building(*ROOM)), pose_at(1, 1)
-    return Drive((1, 1), *events, config=with_policy(CONFIG, **policy))
+    return robot_in(*ROOM, cell=(1, 1), config=with_policy(CONFIG, **policy))
 
 
 def said(drive, after=PERIOD_S):

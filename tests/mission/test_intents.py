@@ -113,16 +113,6 @@ def test_a_command_given_twice_is_given_once(state, name):
     assert twice == once
 
 
-@pytest.mark.parametrize("state", STATES.values(), ids=STATES)
-def test_a_pause_between_leaves_no_trace(state):
-    try:
-        paused = state.commanded(COMMANDS["pause"])
-    except CommandError:
-        return
-    again = OrderState.from_json(paused.to_json()).commanded(COMMANDS["resume"])
-    assert again == replace(state, paused=False, why=again.why)
-
-
 def test_a_robot_sent_home_sweeps_no_other_building_instead():
     sent = replace(OrderState.autostart(), errand="home", home=(3, 4), keep_out=(VASE,))
     for after in (sent.in_other_building("moved"), sent.in_other_frame("moved")):

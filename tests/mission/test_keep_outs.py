@@ -5,19 +5,14 @@ import pytest
 from fasaco_edge.errors import OrderError
 from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.orders.keep_outs import MOST_KEEP_OUT, KeepOut
-from fasaco_edge.mission.work.order_state import OrderState
-from tests.mission.world import CELL, Drive, building, pose_at, rectangle, started
+from tests.mission.world import CELL, Drive, building, cells, idle, pose_at, rectangle, started
 
 ROOM = ("........",) * 6
-ALL = {(row, col) for row in range(6) for col in range(8)}
+ALL = cells(0, 0, 6, 8)
 
 
 def keep_out(name, *bounds):
     return KeepOut(name, tuple(map(tuple, rectangle(*bounds))))
-
-
-def inside(row0, col0, row1, col1):
-    return {(row, col) for row in range(row0, row1) for col in range(col0, col1)}
 
 
 VASE = keep_out("vase", 1, 3, 4, 5)
@@ -33,8 +28,7 @@ def remove(drive, name):
 
 def test_a_keep_out_during_a_mission_keeps_coverage_and_order():
     drive = started(*ROOM)
-    for _ in range(12):
-        drive.go()
+    drive.go(times=12)
     before, covered = drive.mission.order_state, drive.visited
     decision = add(drive, keep_out("vase", *_ahead(drive)))
     assert drive.visited == covered
@@ -61,8 +55,7 @@ def test_no_path_leads_into_it_from_that_step_on():
 
 def test_a_robot_inside_a_keep_out_stops_until_its_removal():
     drive = started(*ROOM)
-    for _ in range(12):
-        drive.go()
+    drive.go(times=12)
     covered = drive.visited
     decision = add(drive, keep_out("here", 0, 0, 6, 8))
     assert decision.path.cells.shape == (0, 2)
@@ -76,8 +69,7 @@ def test_a_robot_inside_a_keep_out_stops_until_its_removal():
 
 def test_a_robot_at_a_keep_out_border_stops_and_is_led_out():
     drive = started(*ROOM)
-    for _ in range(3):
-        drive.go()
+    drive.go(times=3)
     row, col = drive.cell
     decision = add(drive, keep_out("here", row, col, row + 1, col + 1))
     assert decision.path.cells.shape == (0, 2)
@@ -90,19 +82,14 @@ def test_a_robot_at_a_keep_out_border_stops_and_is_led_out():
 
 
 def test_it_holds_under_every_order_until_it_is_removed():
-    drive = Drive(
-        (0, 0),
-        MapReceived(building(*ROOM)),
-        pose_at(0, 0),
-        order_state=OrderState.idle("no order yet"),
-    )
+    drive = idle(*ROOM)
     add(drive, VASE)
     assert drive.mission.state is State.IDLE
     for order in ({"keep_out": [rectangle(0, 7, 1, 8)]}, {}):
         drive.command("start", order)
         drive.driven.clear()
         drive.finish()
-        assert not set(drive.driven) & inside(1, 3, 4, 5)
+        assert not set(drive.driven) & cells(1, 3, 4, 5)
     drive.command("cancel")
     drive.command("reset")
     assert drive.mission.order_state.keep_out == (VASE,)
@@ -115,12 +102,9 @@ def test_it_holds_under_every_order_until_it_is_removed():
 def test_it_outlives_the_daemon():
     drive = started(*ROOM)
     add(drive, VASE)
-    kept = drive.mission.snapshot()
-    again = Drive(drive.cell, order_state=OrderState.from_json(kept.note))
-    again.mission.restore(kept)
-    again.tell(MapReceived(building(*ROOM)), pose_at(*drive.cell))
+    again = drive.restarted(MapReceived(building(*ROOM)), pose_at(*drive.cell))
     again.finish()
-    assert again.visited == ALL - inside(1, 3, 4, 5)
+    assert again.visited == ALL - cells(1, 3, 4, 5)
 
 
 def test_without_one_the_note_is_as_older_daemons_read_it():
@@ -134,15 +118,13 @@ def test_without_one_the_note_is_as_older_daemons_read_it():
 
 def test_paused_and_sent_home_it_stays_so():
     drive = started(*ROOM)
-    for _ in range(12):
-        drive.go()
+    drive.go(times=12)
     drive.command("pause")
     add(drive, VASE)
     assert (drive.mission.state, drive.walk) == (State.PAUSED, [])
     drive.command("home")
     add(drive, keep_out("way", *_ahead(drive)))
-    for _ in range(60):
-        drive.go()
+    drive.go(times=60)
     assert (drive.cell, drive.mission.reason) == ((0, 0), "at home, paused by command")
 
 

@@ -1,7 +1,5 @@
 """Cells at an angle to the map frame: given, or found by the walls, and what is carried over."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -17,12 +15,7 @@ from fasaco_edge.mission.config import Dock, Place
 from fasaco_edge.mission.core.lattice_layout import WallWatch
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
-from fasaco_edge.mission.events import (
-    CommandReceived,
-    MapReceived,
-    PlanReady,
-    PoseReceived,
-)
+from fasaco_edge.mission.events import CommandReceived, MapReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.work.order_state import OrderState
@@ -30,11 +23,14 @@ from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.grid.test_floor import room
-from tests.mission.test_line import CELL_M, CONFIG, ROBOT, START, Robot
+from tests.mission.test_line import CELL_M, CONFIG, ROBOT, START, Robot, robot_on
 from tests.mission.world import with_policy
+from tests.support.grids import seen_around
 
 DEG = 30.0
 AUTO = replace(CONFIG, lattice_deg=None)
+ROOM = room(3.0, 2.4)
+IN_YAW = replace(ROOM, geometry=rotated_geometry(ROOM.geometry, DEG))
 
 
 def turned(grid, deg):
@@ -50,10 +46,6 @@ def turned(grid, deg):
     cells = np.full(rows * cols, -1, np.int8)
     cells[inside] = grid.cells[row[inside], col[inside]]
     return OccupancyGrid(geometry, cells.reshape(rows, cols), grid.frame)
-
-
-def in_yaw(grid, deg):
-    return replace(grid, geometry=rotated_geometry(grid.geometry, deg))
 
 
 def first_path(mission, grid, at, order=None):
@@ -78,11 +70,11 @@ def test_a_turned_building_is_driven_like_a_straight_one(order):
     straight = Mission(with_policy(CONFIG, keep_out=(tuple(map(tuple, COLUMN)),)))
     around = tuple(rotated_point(x, y, DEG) for x, y in COLUMN)
     askew = Mission(with_policy(replace(CONFIG, lattice_deg=DEG), keep_out=(around,)))
-    path, _ = first_path(straight, room(3.0, 2.4), START, order)
+    path, _ = first_path(straight, ROOM, START, order)
     if order is not None:
         polygon = [rotated_point(x, y, DEG) for x, y in ZONE]
         order = {"zones": [{"name": "a", "polygon": polygon}]}
-    other, _ = first_path(askew, in_yaw(room(3.0, 2.4), DEG), rotated_point(*START, DEG), order)
+    other, _ = first_path(askew, IN_YAW, rotated_point(*START, DEG), order)
     assert (other.cells == path.cells).all()
     # Rounding decides where in a cell some of the line's points are.
     there = rotated_points(path.xy, DEG)
@@ -99,10 +91,10 @@ def test_a_turned_building_is_driven_like_a_straight_one(order):
 def test_an_added_keep_out_lies_where_that_of_an_order_lies():
     ordered, added = (Mission(replace(CONFIG, lattice_deg=DEG)) for _ in range(2))
     corners = tuple(rotated_point(x, y, DEG) for x, y in COLUMN)
-    grid, start = in_yaw(room(3.0, 2.4), DEG), rotated_point(*START, DEG)
-    path, _ = first_path(ordered, grid, start, {"keep_out": [corners]})
+    start = rotated_point(*START, DEG)
+    path, _ = first_path(ordered, IN_YAW, start, {"keep_out": [corners]})
     added.step([CommandReceived(1, "keep_out_add", keep_out=KeepOut("column", corners))], 0.0)
-    other, _ = first_path(added, grid, start, {})
+    other, _ = first_path(added, IN_YAW, start, {})
     assert (other.cells == path.cells).all()
     assert OrderState.from_json(added.snapshot().note).keep_out[0].polygon == corners
 
@@ -112,7 +104,7 @@ def test_a_way_home_ends_at_place_and_heading_in_the_map_frame():
     mission = Mission(
         with_policy(replace(CONFIG, lattice_deg=25.0), home=home, dock=Dock(x_m=9, y_m=9))
     )
-    grid, at = room(3.0, 2.4), StampedPose(Pose2D(*START), "map")
+    grid, at = ROOM, StampedPose(Pose2D(*START), "map")
     first_path(mission, grid, START)
     decision = mission.step([CommandReceived(1, "home")], 1.0)
     if decision.plan is not None:
@@ -129,7 +121,7 @@ def test_a_way_home_ends_at_place_and_heading_in_the_map_frame():
 def test_the_refusal_of_a_zone_off_the_map_uses_the_map_frame():
     mission = Mission(replace(CONFIG, lattice_deg=DEG))
     moon = {"zones": [{"name": "moon", "polygon": [[20, 20], [22, 20], [22, 22]]}]}
-    events = MapReceived(room(3.0, 2.4)), PoseReceived(StampedPose(Pose2D(*START), "map"))
+    events = MapReceived(ROOM), PoseReceived(StampedPose(Pose2D(*START), "map"))
     mission.step(events, 0.0)
     decision = mission.step([CommandReceived(1, "start", read_order(moon))], 0.1)
     (answer,) = decision.answers
@@ -140,7 +132,7 @@ def test_an_order_is_kept_to_the_last_bit_as_it_was_given():
     mission = Mission(replace(CONFIG, lattice_deg=17.3))
     zone = {"name": "a", "polygon": [[2.1, 1.1], [3.3, 1.2], [3.1, 2.7]]}
     order = read_order({"zones": [zone], "keep_out": [COLUMN]})
-    first_path(mission, room(3.0, 2.4), START, {"zones": [zone], "keep_out": [COLUMN]})
+    first_path(mission, ROOM, START, {"zones": [zone], "keep_out": [COLUMN]})
     assert mission.order_state.order != order
     kept = OrderState.from_json(mission.snapshot().note)
     assert kept.order == order
@@ -161,19 +153,10 @@ def askew_building():
     return turned(OccupancyGrid(grid.geometry, cells), DEG)
 
 
-def seen_around(grid, at, reach_m):
-    """The same map, of which only what is near a point is known."""
-    col, row = grid.geometry.to_pixels(*at)
-    rows, cols = np.indices(grid.cells.shape)
-    near = np.hypot(rows - row, cols - col) * grid.geometry.resolution < reach_m
-    return OccupancyGrid(grid.geometry, np.where(near, grid.cells, -1).astype(np.int8))
-
-
 def test_cells_align_with_the_walls_once_and_keep_swept_floor():
     grid = askew_building()
-    robot = Robot(Mission(AUTO), at=rotated_point(*START, DEG))
-    robot.tell(MapReceived(seen_around(grid, robot.at, 1.2)))
-    robot.drive(20)
+    start = rotated_point(*START, DEG)
+    robot = robot_on(seen_around(grid, start, 1.2), 20, at=start, config=AUTO)
     mission = robot.mission
     assert mission.rotation.deg == 0.0
     swept_m2, revision = mission.covered.floor.swept_m2, mission.route.revision
@@ -204,10 +187,8 @@ def test_cells_align_with_the_walls_once_and_keep_swept_floor():
 
 def test_a_map_too_small_for_askew_cells_has_them_along_its_axes():
     """A lattice askew over a map spans more cells than one along its axes."""
-    grid = turned(room(5.0, 4.0), DEG)
-    robot = Robot(Mission(replace(AUTO, max_lattice_cells=2600)), at=rotated_point(*START, DEG))
-    robot.tell(MapReceived(grid))
-    robot.drive(40)
+    grid, config = turned(room(5.0, 4.0), DEG), replace(AUTO, max_lattice_cells=2600)
+    robot = robot_on(grid, 40, at=rotated_point(*START, DEG), config=config)
     assert robot.mission.rotation.deg
     cells = np.pad(grid.cells, ((0, 0), (0, 276)), constant_values=-1)
     grown = OccupancyGrid(replace(grid.geometry, cols=cells.shape[1]), cells)
@@ -218,18 +199,19 @@ def test_a_map_too_small_for_askew_cells_has_them_along_its_axes():
     assert robot.line
 
 
-def test_floor_that_is_carried_over_lies_where_it_was():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(3.0, 2.4)))
-    robot.drive(60)
+@pytest.mark.parametrize(("deg", "cell_m"), [(DEG, CELL_M), (0.0, 0.5 * CELL_M)])
+def test_floor_that_is_carried_over_lies_where_it_was(deg, cell_m):
+    robot = robot_on(ROOM, 60)
     robot.mission.covered.break_track()
     before = robot.mission.snapshot()
-    after = relaid_ledger(before, DEG, CELL_M)
-    assert after.lattice_deg == DEG
+    after = relaid_ledger(before, deg, cell_m)
+    assert (after.lattice_deg, after.cell_m) == (deg, cell_m)
+    total = before.total * (CELL_M / cell_m) ** 2
+    assert after.total == pytest.approx(total, rel=0.25)
     assert after.floor.pixels == pytest.approx(before.floor.pixels, rel=0.01)
     # Pixels of the map frame, looked up in both.
     place = GridGeometry(80, 90, 0.05, Pose2D(1.5, 0.5))
-    there = rotated_geometry(place, -DEG)
+    there = rotated_geometry(place, -deg)
     was, now = (
         snapshot_of(ledger).swept_on(geometry)
         for ledger, geometry in ((before, place), (after, there))
@@ -239,25 +221,10 @@ def test_floor_that_is_carried_over_lies_where_it_was():
     rows, cols = np.nonzero(after.visits(Window(-20, -20, 60, 60)))
     assert len(rows)
     for row, col in zip((rows - 20).tolist(), (cols - 20).tolist(), strict=True):
-        x, y = rotated_point((col + 0.5) * CELL_M, (row + 0.5) * CELL_M, DEG)
+        x, y = rotated_point((col + 0.5) * cell_m, (row + 0.5) * cell_m, deg)
         pixel = Window(int(y / 0.025), int(x / 0.025), int(y / 0.025) + 1, int(x / 0.025) + 1)
         assert before.floor.swept_in(pixel).all()
     assert relaid_ledger(before, 0.0, CELL_M) is before
-
-
-def test_cells_of_another_size_count_by_their_centres():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(3.0, 2.4)))
-    robot.drive(60)
-    before = robot.mission.snapshot()
-    after = relaid_ledger(before, 0.0, 0.5 * CELL_M)
-    assert after.floor.tiles == before.floor.tiles
-    assert (after.cell_m, after.total) == (0.5 * CELL_M, pytest.approx(4 * before.total, rel=0.25))
-    rows, cols = np.nonzero(after.visits(Window(-20, -20, 60, 60)))
-    assert len(rows) == after.total
-    for row, col in zip((rows - 20).tolist(), (cols - 20).tolist(), strict=True):
-        y, x = ((at + 0.5) * after.cell_m // 0.025 for at in (row, col))
-        assert before.floor.swept_in(Window(int(y), int(x), int(y) + 1, int(x) + 1)).all()
 
 
 def snapshot_of(ledger):

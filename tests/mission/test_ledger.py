@@ -15,11 +15,15 @@ from fasaco_edge.mission.coverage.ledger import (
     TILE,
     CoverageLedger,
 )
+from fasaco_edge.mission.coverage.mission_ledger import (
+    MOST_AGAIN,
+    MOST_PASSED,
+    MissionLedger,
+    PassedCells,
+)
 from fasaco_edge.mission.events import MapReceived
-from tests.mission.world import Drive, building, pose_at
+from tests.mission.world import CELL, Drive, building, pose_at
 from tests.support.examples import examples
-
-CELL = 0.25
 
 
 def drive(*points, cell_m=CELL):
@@ -38,14 +42,6 @@ def counts(ledger, window=NEARBY):
         (row + window.row0, col + window.col0): int(visits[row, col])
         for row, col in np.argwhere(visits).tolist()
     }
-
-
-def test_a_straight_drive_visits_each_cell_on_it_once():
-    ledger, entered = drive(*[(0.5, 0.5 + 0.1 * step) for step in range(51)])
-    assert counts(ledger) == {(0, col): 1 for col in range(6)}
-    assert ledger.total == 6
-    assert sum(len(cells) for cells in entered) == 6
-    assert entered[0] == {(0, 0)}
 
 
 def test_a_jump_is_not_swept():
@@ -196,3 +192,45 @@ def test_the_tiles_nearest_to_the_robot_are_kept():
         ledger.record(Pose2D((number * TILE + 0.5) * CELL, 0.5 * CELL))
     kept = sorted(col for _, col in ledger.snapshot().tiles)
     assert kept == list(range(DROPPED_TILES, MOST_TILES + 1))
+
+
+def test_the_robot_comes_back_to_a_cell_a_few_times_only():
+    ledger = MissionLedger(CELL, CELL)
+    for _ in range(MOST_AGAIN):
+        assert ledger.may_open_again((0, 1))
+        ledger.open_again([(0, 1)])
+    assert not ledger.may_open_again((0, 1))
+    assert ledger.may_open_again((1, 0))
+    ledger.begin_elsewhere("map")
+    assert ledger.may_open_again((0, 1))
+
+
+def test_a_reopened_cell_is_covered_only_by_another_visit():
+    ledger = MissionLedger(CELL, CELL)
+    for col in (0, 1, 2):
+        ledger.record(pose_at(0, col).pose.pose)
+    before = ledger.version
+    ledger.open_again([(0, 1), (5, 5)])
+    assert ledger.version != before
+    assert [ledger.current.has_visited((0, col)) for col in (0, 1, 2)] == [True, False, True]
+    assert not ledger.current.has_visited((5, 5))
+    ledger.record(pose_at(0, 1).pose.pose)
+    assert ledger.current.has_visited((0, 1))
+
+
+def test_a_cell_is_kept_until_its_floor_is_swept():
+    cells = PassedCells()
+    cells.add((3, 5))
+    assert cells.next(9) == [(3, 5)]
+    assert cells.inside(Window(3, 5, 4, 6)).all()
+    cells.drop((3, 5))
+    assert cells.next(9) == []
+    assert not cells.inside(Window(0, 0, 9, 9)).any()
+
+
+def test_passed_cells_are_checked_in_turn_and_bounded():
+    cells = PassedCells()
+    for col in range(MOST_PASSED + 5):
+        cells.add((0, col))
+    seen = [cells.next(500)[0][1] for _ in range(5)]
+    assert seen == [5, 505, 1005, 1505, 5]

@@ -22,13 +22,7 @@ from fasaco_edge.kernels.floor.sweeps import NEVER
 from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
-from fasaco_edge.mission.events import (
-    CommandReceived,
-    MapReceived,
-    PlanReady,
-    PoseReceived,
-    State,
-)
+from fasaco_edge.mission.events import CommandReceived, MapReceived, PlanReady, PoseReceived, State
 from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.polyline import POLISHED
 from fasaco_edge.mission.line.tally import SweepTally
@@ -41,7 +35,7 @@ from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.wire.documents.replies import FloorReport
 from tests.grid.test_floor import room
-from tests.grid.test_floor_map import part_of
+from tests.support.grids import cropped
 
 TOOL_M, RADIUS_M, CELL_M = 0.3, 0.18, 0.276
 ROBOT = SweepingRobot(TOOL_M, RADIUS_M, 0.25, 1.5)
@@ -66,7 +60,9 @@ class Robot:
     trail: list[tuple[float, float]] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
 
-    def tell(self, *events):
+    def tell(self, *events, times=1):
+        for _ in range(times - 1):
+            self.tell()
         pose = StampedPose(Pose2D(*self.at), "map", round(1e9 * self.clock_speed * self.now))
         decision = self.mission.step([*events, PoseReceived(pose)], self.now)
         for _ in range(4):
@@ -105,6 +101,14 @@ class Robot:
             # What is counted wrong stays so: to count it takes half of the time of a drive.
             self.drive(is_checked=number % 8 == 0)
         raise AssertionError(f"still {self.mission.state}: {self.mission.reason}")
+
+
+def robot_on(grid, steps=0, *, at=START, config=CONFIG):
+    """A robot that has got its first line over a map, and has driven so many steps."""
+    robot = Robot(Mission(config), at=at)
+    robot.tell(MapReceived(grid))
+    robot.drive(steps)
+    return robot
 
 
 def check_tally(mission):
@@ -154,8 +158,7 @@ def shifted(grid, by_m):
 
 def test_a_pose_that_jumps_within_reach_searches_nothing():
     """Each of a burst searched the whole lattice, and compared it with itself."""
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(3.0, 2.4)))
+    robot = robot_on(room(3.0, 2.4))
     area, robot.at = robot.mission.map.area, (START[0] + 1.5, START[1])
     robot.tell()
     assert area is not None
@@ -165,8 +168,7 @@ def test_a_pose_that_jumps_within_reach_searches_nothing():
 
 def test_a_room_is_swept_to_its_rim():
     grid = room(3.0, 2.4)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
+    robot = robot_on(grid)
     robot.finish()
     judged = judge_floor(grid, np.array(robot.trail), ROBOT)
     centres = 1.0 - (2 * 0.15 * (3.0 + 2.4)) / (3.0 * 2.4)
@@ -205,8 +207,7 @@ def test_the_line_ahead_is_timed_and_bounded_from_below():
 
 
 def test_the_time_of_a_long_segment_runs_down():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(4.8, 2.4)))
+    robot = robot_on(room(4.8, 2.4))
     while math.dist(robot.at, START) < 1.5:
         robot.drive(is_checked=False)
     robot.tell(CommandReceived(1, "home"))
@@ -235,8 +236,8 @@ def test_the_status_says_what_of_the_floor_is_left_and_why():
 
 
 def test_after_a_restart_floor_left_by_a_finished_order_has_its_reasons():
-    grid, robot = room(3.0, 2.4), Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
+    grid = room(3.0, 2.4)
+    robot = robot_on(grid)
     robot.finish()
     before = {left.reason for left in floor_report(robot.mission).left}
     again = Robot(Mission(CONFIG), at=robot.at)
@@ -253,9 +254,7 @@ def test_no_floor_is_not_worth_the_way_before_the_first_path():
 
 
 def test_the_rest_of_an_order_is_pending_while_the_robot_is_home():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(3.0, 2.4)))
-    robot.drive(10)
+    robot = robot_on(room(3.0, 2.4), 10)
     robot.tell(CommandReceived(1, "home"))
     reasons = []
     while robot.mission.state is not State.PAUSED:
@@ -283,9 +282,8 @@ def test_the_status_says_what_floor_is_out_of_reach_and_why():
     cells[:, 80] = 100
     cells[2:30, 20], cells[2:30, 25] = 100, 100
     grid = OccupancyGrid(grid.geometry, cells)
-    robot = Robot(Mission(CONFIG), at=(4.6, 2.6))
+    robot = robot_on(grid, at=(4.6, 2.6))
     zone = [[5.0, 1.0], [5.9, 1.0], [5.9, 1.9], [5.0, 1.9]]
-    robot.tell(MapReceived(grid))
     robot.tell()
     told = floor_report(robot.mission)
     judged = judge_floor(grid, np.array([robot.at]), ROBOT)
@@ -313,9 +311,7 @@ def test_the_status_says_what_floor_is_out_of_reach_and_why():
 
 
 def test_the_line_avoids_a_new_keep_out_at_once():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(4.8, 2.4)))
-    robot.drive(20)
+    robot = robot_on(room(4.8, 2.4), 20)
     covered, swept_m2 = robot.mission.coverage().covered, robot.mission.covered.floor.swept_m2
     assert covered > 3
     corners = ((4.2, 2.0), (4.7, 2.0), (4.7, 2.5), (4.2, 2.5))
@@ -330,9 +326,7 @@ def test_the_line_avoids_a_new_keep_out_at_once():
 
 
 def test_floor_behind_a_new_keep_out_is_not_hidden_by_thick_walls():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(4.8, 2.4)))
-    robot.drive(5)
+    robot = robot_on(room(4.8, 2.4), 5)
     fence = KeepOut("fence", ((4.4, 0.0), (4.5, 0.0), (4.5, 9.0), (4.4, 9.0)))
     robot.tell(CommandReceived(1, "keep_out_add", keep_out=fence))
     robot.finish()
@@ -351,8 +345,7 @@ def test_unreachable_floor_follows_map_growth_and_zone_orders():
     shut[:, 80] = 100
     hidden = shut.copy()
     hidden[:, 60:] = -1
-    last = Robot(Mission(CONFIG), at=(3.0, 2.0))
-    last.tell(MapReceived(OccupancyGrid(whole.geometry, shut)))
+    last = robot_on(OccupancyGrid(whole.geometry, shut), at=(3.0, 2.0))
     last.tell()
     robot = Robot(Mission(CONFIG), at=(3.0, 2.0))
     zone = {"name": "left", "polygon": [[2.0, 1.0], [4.0, 1.0], [4.0, 3.4], [2.0, 3.4]]}
@@ -373,11 +366,8 @@ def test_maps_that_grow_and_change_on_the_way(chunk, monkeypatch):
     monkeypatch.setattr(floor_map, "CHUNK", chunk)
     whole = with_obstacle(room(3.6, 3.0), 24, 30)
     rng = np.random.default_rng(3)
-    robot = Robot(Mission(CONFIG))
-    rows, cols = whole.cells.shape
-    known = part_of(whole, 0, 0, 36, 40)
-    robot.tell(MapReceived(known))
-    truth = whole
+    robot = robot_on(cropped(whole, 0, 0, 36, 40))
+    (rows, cols), truth = whole.cells.shape, whole
     for number in range(14):
         robot.drive(int(rng.integers(2, 9)))
         if number % 3 == 2:
@@ -386,7 +376,7 @@ def test_maps_that_grow_and_change_on_the_way(chunk, monkeypatch):
             if abs(row - place[1]) + abs(col - place[0]) > 16:
                 truth = with_obstacle(truth, row, col, 3, int(rng.choice([0, 100])))
         low, high = rng.integers(0, 6, 2), (rows - rng.integers(0, 5), cols - rng.integers(0, 5))
-        robot.tell(MapReceived(part_of(truth, *low.tolist(), *(int(each) for each in high))))
+        robot.tell(MapReceived(cropped(truth, *low.tolist(), *(int(each) for each in high))))
         check_tally(robot.mission)
         assert_clear(robot, truth)
     robot.tell(MapReceived(truth))
@@ -398,16 +388,15 @@ def test_lines_begin_at_a_robot_slightly_off_its_line():
     """Its disc may touch a wall then, by a pixel; the line begins beside it all the same."""
     whole, off_m = with_obstacle(room(3.6, 3.0), 24, 30), 0.02
     rng = np.random.default_rng(3)
-    robot = Robot(Mission(CONFIG))
     seen = np.array((36, 40))
-    robot.tell(MapReceived(part_of(whole, 0, 0, *seen.tolist())))
+    robot = robot_on(cropped(whole, 0, 0, *seen.tolist()))
     for _ in range(60):
         robot.drive(2)
         on_line, turn = robot.at, rng.uniform(0.0, math.tau)
         robot.at = (on_line[0] + off_m * math.cos(turn), on_line[1] + off_m * math.sin(turn))
         seen = np.minimum(seen + rng.integers(0, 3, 2), whole.cells.shape)
         told = len(robot.reasons)
-        robot.tell(MapReceived(part_of(whole, 0, 0, *seen.tolist())))
+        robot.tell(MapReceived(cropped(whole, 0, 0, *seen.tolist())))
         if len(robot.reasons) > told and robot.line:
             assert math.dist(robot.line[0], robot.at) < 2 * off_m
         robot.at = on_line
@@ -434,9 +423,7 @@ def assert_clear(robot, grid, most_m=2.4):
 
 def test_a_new_obstacle_is_driven_round_at_once():
     grid = room(3.0, 2.4)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
-    robot.drive(12)
+    robot = robot_on(grid, 12)
     x, y = robot.line[min(6, len(robot.line) - 1)]
     col, row = (int(each) for each in grid.geometry.to_pixels(x, y))
     if math.dist((x, y), robot.at) < 0.4:
@@ -448,16 +435,14 @@ def test_a_new_obstacle_is_driven_round_at_once():
     for _ in range(4):
         robot.now += 0.3
         robot.tell()
-    assert_clear(robot, blocked, 2.4)
+    assert_clear(robot, blocked)
     robot.finish()
 
 
 def test_a_plan_continues_from_the_cell_nearest_to_the_robot():
     # Behind the robot it would turn back.
-    line = replace(LINES["thorough"], price_s_m2=0.0)
-    sweeping = replace(CONFIG.sweeping, line=line)
-    robot = Robot(Mission(replace(CONFIG, sweeping=sweeping)))
-    robot.tell(MapReceived(room(3.6, 3.0)))
+    sweeping = replace(CONFIG.sweeping, line=replace(LINES["thorough"], price_s_m2=0.0))
+    robot = robot_on(room(3.6, 3.0), config=replace(CONFIG, sweeping=sweeping))
     for _ in range(60):
         robot.drive()
         path = robot.mission.route.path
@@ -467,10 +452,8 @@ def test_a_plan_continues_from_the_cell_nearest_to_the_robot():
 
 def test_the_current_cell_stays_near_a_robot_on_a_polished_line():
     """It was up to 12 m away: points took the cells of those that they replaced."""
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(6.0, 4.8)))
-    for _ in range(200):
-        robot.tell()
+    robot = robot_on(room(6.0, 4.8))
+    robot.tell(times=200)
     apart = []
     for _ in range(600):
         robot.drive(is_checked=False)
@@ -484,10 +467,7 @@ def test_the_current_cell_stays_near_a_robot_on_a_polished_line():
 def test_a_path_that_ends_where_it_was_cut_off_is_whole_again():
     """Its line waited for a plan that had come, was not polished, and could be of one point."""
     grid = room(6.0, 0.4)
-    robot = Robot(Mission(CONFIG))
-    robot.at = 2.3, 1.2
-    robot.tell(MapReceived(grid))
-    robot.drive(12)
+    robot = robot_on(grid, 12, at=(2.3, 1.2))
     cells = len(robot.mission.route.path.cells)
     wall = grid.cells.copy()
     wall[:, -30:] = 100
@@ -497,19 +477,27 @@ def test_a_path_that_ends_where_it_was_cut_off_is_whole_again():
     robot.finish()
 
 
-def test_a_robot_that_stands_gets_its_line_again():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(6.0, 3.0)))
-    for _ in range(20):
-        robot.tell()
+def under_way():
+    robot = robot_on(room(6.0, 3.0))
+    robot.tell(times=20)
     robot.drive(20)
+    return robot
+
+
+def wait_for_line(robot, tick_s=0.3):
+    """Let a robot stand until it gets a line; return how long it has stood [s]."""
+    stood_since = robot.now
+    while not robot.line and robot.now < stood_since + 45.0:
+        robot.now += tick_s
+        robot.tell()
+    return robot.now - stood_since
+
+
+def test_a_robot_that_stands_gets_its_line_again():
+    robot = under_way()
     told, line = len(robot.reasons), robot.line
     robot.line = []  # it ran into something, and gave up
-    for _ in range(150):
-        robot.now += 0.3
-        robot.tell()
-        if robot.line:
-            break
+    wait_for_line(robot)
     assert robot.reasons[told:] == ["robot stands"]
     assert math.dist(robot.line[0], robot.at) < 0.05
     assert robot.line[-1] == line[-1]
@@ -517,49 +505,32 @@ def test_a_robot_that_stands_gets_its_line_again():
 
 
 def test_standstills_are_timed_by_the_robots_clock():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(6.0, 3.0)))
-    for _ in range(20):
-        robot.tell()
-    robot.drive(20)
-    told, stood_since = len(robot.reasons), robot.now
+    robot = under_way()
+    told = len(robot.reasons)
     robot.line, robot.clock_speed = [], 20.0  # it is simulated, at twenty times the real speed
-    while not robot.line and robot.now < stood_since + 40.0:
-        robot.now += 0.1
-        robot.tell()
+    assert wait_for_line(robot, 0.1) < 2.0
     assert robot.reasons[told:] == ["robot stands"]
-    assert robot.now - stood_since < 2.0
     robot.finish()
 
 
 def test_a_robot_beside_its_path_is_led_to_it_at_once():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(6.0, 3.0)))
-    for _ in range(20):
-        robot.tell()
-    robot.drive(20)
+    robot = under_way()
     robot.line = []  # it lost its path, and swerved
     (x, y), inward = robot.at, math.copysign(0.05, 1.5 - robot.at[1])
     for step in range(1, 15):
         robot.at, robot.now = (x, y + step * inward), robot.now + 0.3
         robot.tell()
-    told, stood_since = len(robot.reasons), robot.now
-    while not robot.line and robot.now < stood_since + 40.0:
-        robot.now += 0.3
-        robot.tell()
+    told = len(robot.reasons)
+    assert wait_for_line(robot) < 3.0
     assert robot.reasons[told:] == ["robot left the path"]
-    assert robot.now - stood_since < 3.0
     assert math.dist(robot.line[0], robot.at) < 0.15
     robot.finish()
 
 
 def test_a_pause_leaves_the_line_as_it_was():
-    mission = Mission(CONFIG)
-    robot = Robot(mission)
-    robot.tell(MapReceived(room(4.5, 3.5)))
-    robot.drive(20)
+    robot = robot_on(room(4.5, 3.5), 20)
     # As it is polished by now: of what lies further on the robot was not told yet.
-    before = mission.line._ahead.xy()[1:]
+    before = robot.mission.line._ahead.xy()[1:]
     robot.tell(CommandReceived(1, "pause"))
     assert robot.line == []
     # A robot that brakes comes a little further.
@@ -574,17 +545,12 @@ def test_a_pause_leaves_the_line_as_it_was():
 
 
 def test_on_its_way_home_it_sweeps_nothing_beside_it():
-    mission = Mission(CONFIG)
-    robot = Robot(mission)
-    robot.tell(MapReceived(room(4.5, 3.5)))
-    robot.drive(60)
+    robot = robot_on(room(4.5, 3.5), 60)
     robot.tell(CommandReceived(1, "home"))
     assert robot.reasons[-1] == "drives home"
     way_m = sum(math.dist(*leg) for leg in pairwise([robot.at, *robot.line]))
     told = len(robot.reasons)
-    for _ in range(200):
-        if mission.state is State.PAUSED:
-            break
+    while robot.mission.state is not State.PAUSED and robot.now < 200.0:
         robot.drive()
     assert robot.reasons[told:] == ["at home, paused by command"]
     assert math.dist(robot.at, START) < CELL_M
@@ -595,14 +561,12 @@ def test_on_its_way_home_it_sweeps_nothing_beside_it():
 
 @pytest.mark.parametrize(
     "other",
-    [lambda grid: shifted(grid, 0.012), lambda grid: part_of(grid, 0, 0, 40, 50)],
+    [lambda grid: shifted(grid, 0.012), lambda grid: cropped(grid, 0, 0, 40, 50)],
     ids=["on another raster", "of another size"],
 )
 def test_a_map_received_before_a_pose_is_swept_afterwards(other):
     grid = room(3.0, 2.4)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
-    robot.drive(10)
+    robot = robot_on(grid, 10)
     here, robot.at = robot.at, (50.0, 50.0)
     robot.now += 2.0
     robot.tell()
@@ -618,9 +582,7 @@ def test_a_map_received_before_a_pose_is_swept_afterwards(other):
 
 def test_a_map_shifted_by_part_of_a_pixel_keeps_most_of_the_line():
     grid = room(3.6, 3.0)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
-    robot.drive(10)
+    robot = robot_on(grid, 10)
     ahead = robot.mission.line._ahead
     before = raster_to_map(ahead._geometry, ahead.line.points)
     robot.tell(MapReceived(shifted(grid, 0.012)))
@@ -633,8 +595,7 @@ def test_a_map_shifted_by_part_of_a_pixel_keeps_most_of_the_line():
 
 def test_a_robot_that_jumped_ahead_is_not_led_through_a_new_wall():
     grid = room(6.0, 0.5)
-    robot = Robot(Mission(CONFIG), at=(4.0, 1.25))
-    robot.tell(MapReceived(grid))
+    robot = robot_on(grid, at=(4.0, 1.25))
     turned = False
     while not (turned and robot.at[0] > 2.5):
         robot.drive()  # to the nearer end of the corridor, and back over cells that are covered
@@ -658,8 +619,7 @@ def cost_s(ahead, line):
 
 def test_a_line_on_a_growing_map_never_becomes_worse():
     grid = with_obstacle(with_obstacle(room(6.0, 3.0), 22, 30), 0, 82, 62, UNKNOWN)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
+    robot = robot_on(grid)
     assert robot.mission.orders.cells.is_exploring
     ahead, line = robot.mission.line._ahead, CONFIG.sweeping.line
     while (first := ahead.line.first_below(POLISHED)) < len(ahead.line) and (
@@ -676,13 +636,10 @@ def test_a_line_on_a_growing_map_never_becomes_worse():
 
 
 def test_a_changed_line_is_published_when_the_robot_is_near():
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(6.0, 3.0)))
-    for _ in range(100):
-        robot.tell()
+    robot = robot_on(room(4.5, 2.4))
+    robot.tell(times=100)
     told, ahead = len(robot.reasons), robot.mission.line._ahead
-    for _ in range(100):
-        robot.tell()
+    robot.tell(times=100)
     # It stands: random moves go on further ahead, and are not its concern yet.
     assert len(robot.reasons) == told
     assert not np.isin(ahead.xy()[1:], robot.line).all()
@@ -699,9 +656,7 @@ def test_a_changed_line_is_published_when_the_robot_is_near():
 @pytest.mark.parametrize("poses_a_step", [1, 32])
 def test_forgotten_floor_is_swept_again(poses_a_step):
     """However many poses come with the news, as after a slow step."""
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(room(3.0, 2.4)))
-    robot.drive(10)
+    robot = robot_on(room(3.0, 2.4), 10)
     mission, (x, y) = robot.mission, robot.trail[2]
 
     def around(window):

@@ -1,13 +1,13 @@
 """A line put together of pieces of the one before, and of stands between them."""
 
-from __future__ import annotations
-
+import itertools
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from fasaco_edge.mission.line.pieces import Joiner, Piece, kept_pieces
+from fasaco_edge.mission.line.place_on_line import aligned, by_distance
 from fasaco_edge.mission.line.polyline import POLISHED, RAW, Polyline
 
 
@@ -36,14 +36,14 @@ def polished(walk):
     return Polyline(points + np.array((0.5, 0.0)), numbers, np.full(len(walk), POLISHED, np.uint8))
 
 
-def join(walk, pieces, is_clear=lambda a, b: True):
-    here = Polyline(stand(walk[0])[None], np.array([0]), np.array([POLISHED], np.uint8))
-    joiner = Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False, no_way)
-    return joiner.joined(pieces)
-
-
 def no_way(a, b):
     return np.empty((0, 2))
+
+
+def join(walk, pieces, is_clear=lambda a, b: True, *, here=None, over=over, way=no_way):
+    if here is None:
+        here = Polyline(stand(walk[0])[None], np.array([0]), np.array([POLISHED], np.uint8))
+    return Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False, way).joined(pieces)
 
 
 def whole(pieces):
@@ -131,8 +131,7 @@ def test_a_stand_is_left_out_only_if_the_way_past_it_is_clear():
     def is_clear(a, b):
         return {tuple(a.tolist()), tuple(b.tolist())} != blocked
 
-    joiner = Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False, no_way)
-    found = whole(joiner.joined([Piece(line, 0)]))
+    found = whole(join(walk, [Piece(line, 0)], is_clear, here=here))
     ways = pairwise(found.points)
     assert all(is_clear(a, b) for a, b in ways)
     assert found.points[-1].tolist() == stand((2, 5)).tolist()
@@ -148,19 +147,20 @@ def test_pieces_without_a_stand_between_them_are_joined():
         return points[[0, -1]][1:], numbers[[0, -1]][1:]
 
     here = polished(walk[:1])
-    joiner = Joiner(
-        here, walk, 0, stand, without_corners, lambda a, b: True, lambda cell: False, no_way
-    )
     pieces = [Piece(line.part(0, 2), 0), Piece(line.part(4, 6), 4)]
-    assert whole(joiner.joined(pieces)).cells.tolist()[:4] == [0, 1, 4, 5]
+    assert whole(join(walk, pieces, here=here, over=without_corners)).cells.tolist()[:4] == [
+        0,
+        1,
+        4,
+        5,
+    ]
 
 
 def test_a_walk_of_one_cell_is_a_line_of_one_stand():
     walk = cells((0, 0))
     here = polished(walk)
     # Not even its own stand can be driven to from where the robot is.
-    joiner = Joiner(here, walk, 0, stand, over, lambda a, b: False, lambda cell: False, no_way)
-    assert whole(joiner.joined([])).points.tolist() == [[0.0, 0.0]]
+    assert whole(join(walk, [], lambda a, b: False, here=here)).points.tolist() == [[0.0, 0.0]]
 
 
 def test_behind_a_pillar_the_line_begins_with_the_way_round_it():
@@ -170,10 +170,40 @@ def test_behind_a_pillar_the_line_begins_with_the_way_round_it():
     def is_clear(a, b):  # the robot's place sees a corner alone
         return (a != here.points[0]).any()
 
-    joiner = Joiner(
-        here, walk, 0, stand, over, is_clear, lambda cell: False, lambda a, b: a[None] + (0.0, -5.0)
-    )
-    line = whole(joiner.joined([]))
+    line = whole(join(walk, [], is_clear, here=here, way=lambda a, b: a[None] + (0.0, -5.0)))
     assert line.points[:3].tolist() == [[-9.0, 0.0], [-9.0, -5.0], [0.0, 0.0]]
     assert line.cells[:3].tolist() == [0, 0, 0]
     assert (line.points[2:] == stand(walk)).all()
+
+
+# Points of a line and the cells of its walk that they stand for.
+
+
+def stands(*places):
+    return np.array(places, float)
+
+
+LANES = stands(*[(0, x) for x in range(10)], *[(1, x) for x in range(9, -1, -1)])
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_sum_of_squared_distances_is_the_least(seed):
+    rng = np.random.default_rng(seed)
+    count, cells = int(rng.integers(2, 5)), int(rng.integers(1, 6))
+    points, places = rng.random((count, 2)), rng.random((cells, 2))
+    inner = itertools.combinations_with_replacement(range(cells), count - 2)
+    orders = [np.array([0, *order, cells - 1]) for order in inner]
+
+    def apart(order):
+        return ((points - places[order]) ** 2)[1:].sum()
+
+    assert apart(aligned(points, places)) == pytest.approx(min(map(apart, orders)))
+
+
+def test_a_cell_without_a_stand_gets_no_point():
+    places = LANES[:10].copy()
+    places[3:6] = np.nan
+    assert aligned(LANES[[0, 4, 9]], places)[1] in (2, 6)
+    nearest = by_distance(LANES[4], places).tolist()
+    assert nearest[:2] == [2, 6]
+    assert nearest[-3:] == [3, 4, 5]

@@ -1,7 +1,5 @@
 """The line of a mission on maps and with robots that nobody would wish for."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import replace
@@ -9,6 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.robot import RobotConfig
+from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
@@ -24,8 +25,17 @@ from fasaco_edge.mission.line.laying import lay, lay_blocked
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import NO_EDGES, POLISHED, edges_between
 from fasaco_edge.mission.orders.keep_outs import KeepOut
+from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.grid.test_floor import room
-from tests.mission.test_line import CONFIG, RADIUS_M, ROBOT, Robot, assert_clear
+from tests.mission.test_line import (
+    CONFIG,
+    RADIUS_M,
+    ROBOT,
+    Robot,
+    assert_clear,
+    robot_on,
+    with_obstacle,
+)
 
 PIXEL_M = 0.05
 
@@ -38,8 +48,7 @@ def grid_of(free, origin=(0.0, 0.0)):
 
 def finish(grid, at, config=CONFIG):
     """Let a robot carry a mission out; return its figures and the mission."""
-    robot = Robot(Mission(config), at)
-    robot.tell(MapReceived(grid))
+    robot = robot_on(grid, at=at, config=config)
     assert_clear(robot, grid)
     robot.finish()
     return judge_floor(grid, np.array([*robot.trail, robot.at]), ROBOT).figures, robot.mission
@@ -51,8 +60,7 @@ def test_a_tool_much_narrower_or_wider_than_the_robot(tool_m):
     cell_m = tool_m * 0.92
     sweeping = Sweeping(tool_m, 1_000_000, CONFIG.sweeping.line)
     config = replace(CONFIG, footprint=Footprint(cell_m, RADIUS_M), sweeping=sweeping)
-    robot = Robot(Mission(config))
-    robot.tell(MapReceived(grid))
+    robot = robot_on(grid, config=config)
     robot.finish()
     tool = SweepingRobot(tool_m, RADIUS_M, 0.25, 1.5)
     figures = judge_floor(grid, np.array(robot.trail), tool).figures
@@ -63,8 +71,7 @@ def test_a_tool_much_narrower_or_wider_than_the_robot(tool_m):
 def test_a_lane_too_narrow_for_the_robot_is_not_driven():
     free = np.zeros((40, 80), np.bool_)
     free[20, 4:76] = True
-    robot = Robot(Mission(CONFIG), (2.0, 1.025))
-    robot.tell(MapReceived(grid_of(free)))
+    robot = robot_on(grid_of(free), at=(2.0, 1.025))
     assert robot.mission.state is State.BLOCKED
     assert "too close" in robot.mission.reason
     assert not robot.line
@@ -96,11 +103,7 @@ def thin_walls():
 
 @pytest.mark.parametrize(
     ("free", "at", "swept"),
-    [
-        (lane(), (2.0, 1.0), 0.9),
-        (round_hall(), (1.9, 2.2), 0.95),
-        (thin_walls(), (0.8, 0.8), 0.95),
-    ],
+    [(lane(), (2.0, 1.0), 0.9), (round_hall(), (1.9, 2.2), 0.95), (thin_walls(), (0.8, 0.8), 0.95)],
     ids=["a free lane as wide as the robot", "no straight wall", "walls of single pixels"],
 )
 def test_an_odd_building_is_swept_and_no_wall_is_touched(free, at, swept):
@@ -112,8 +115,7 @@ def test_an_odd_building_is_swept_and_no_wall_is_touched(free, at, swept):
 
 def test_a_map_that_turns_by_a_degree_with_each_message():
     grid = room(3.0, 2.4)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
+    robot = robot_on(grid)
     origin, turned = grid.geometry.origin, grid
     for degrees in range(1, 7):
         robot.drive(8)
@@ -136,9 +138,7 @@ def test_a_map_that_jumps_far_and_back_needs_no_more_memory(far_m):
     geometry = near.geometry
     origin = Pose2D(geometry.origin.x + far_m, geometry.origin.y - far_m)
     far = OccupancyGrid(replace(geometry, origin=origin), near.cells)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(near))
-    robot.drive(5)
+    robot = robot_on(near, 5)
     before_mb, (x, y) = peak_mb(os.getpid()), robot.at
     robot.at = (x + far_m, y - far_m)
     robot.tell(MapReceived(far))
@@ -260,3 +260,42 @@ def test_without_its_last_keep_out_the_whole_floor_is_swept():
     robot.finish()
     figures = judge_floor(grid, np.array([*robot.trail, robot.at]), ROBOT).figures
     assert figures.swept_share > 0.95
+
+
+# Lines keep a clearance from walls and furniture, but for floor worth it.
+
+
+CLEARANCE_M = 0.02
+
+
+def driven(clearance_m):
+    """Return the room, and the way that a robot has driven in it until its mission was done."""
+    grid = with_obstacle(room(3.0, 2.4), 28, 30, 2)
+    sweeping = replace(CONFIG.sweeping, clearance_m=clearance_m)
+    robot = robot_on(grid, config=replace(CONFIG, sweeping=sweeping))
+    robot.finish()
+    return grid, np.array(robot.trail)
+
+
+def near_share(grid, trail):
+    """Return the share of points of a way without clearance, but for a rounding."""
+    rows, cols = np.nonzero((grid.cells < 0) | (grid.cells > 25))
+    near = 0
+    for x, y in trail.tolist():
+        col, row = grid.geometry.to_pixels(x, y)
+        off = np.maximum(np.abs(np.stack([cols + 0.5 - col, rows + 0.5 - row])) - 0.5, 0.0)
+        apart_m = np.hypot(*off).min() * grid.geometry.resolution
+        near += apart_m < RADIUS_M + 0.75 * CLEARANCE_M
+    return near / len(trail)
+
+
+def test_a_mission_keeps_its_clearance_and_sweeps_nearly_all():
+    (grid, without), (_, kept) = driven(0.0), driven(CLEARANCE_M)
+    assert near_share(grid, kept) < 0.3 * near_share(grid, without)
+    swept = [judge_floor(grid, trail, ROBOT).figures.swept_share for trail in (without, kept)]
+    assert swept[1] > swept[0] - 0.04
+
+
+def test_the_configured_clearance_is_that_of_the_mission():
+    config = DaemonConfig(robot=RobotConfig(clearance_m=0.03))
+    assert mission_config(config, NearOptimal()).sweeping.clearance_m == 0.03

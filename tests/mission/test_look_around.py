@@ -1,7 +1,5 @@
 """A robot whose first map shows hardly more than the place where it stands."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -11,15 +9,13 @@ import pytest
 from fasaco_edge.mission.core.look_around import LOOK_S, WAITS
 from fasaco_edge.planners.curve_config import CurveConfig
 from tests.mission.line_robot import CONFIG, LineRobot
+from tests.support.rooms import room
 
 # In the middle of a cell; half the edge of a first scan's floor that holds this cell alone [m].
 START, HALF_M = (2.07, 1.518), 0.25
 
 
-def room():
-    pixels = np.full((60, 80), 100, np.int8)
-    pixels[1:59, 1:79] = 0
-    return pixels
+ROOM = room(4.0, 3.0)
 
 
 def first_scan(half_m=HALF_M):
@@ -46,7 +42,7 @@ def test_it_turns_on_the_spot_and_sweeps_what_it_then_sees():
     ]
     assert sum(turns) == pytest.approx(math.tau)
     robot.wait(5.0, lambda robot: False)
-    robot.show(room())
+    robot.show(ROOM)
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
     assert robot.mission.coverage().fraction == 1.0
     assert len(looked(robot)) == 1
@@ -56,7 +52,7 @@ def test_without_a_better_map_it_waits_and_is_never_done():
     robot = LineRobot(first_scan(), START)
     assert not robot.wait(300.0, lambda robot: robot.mission.state == "done")
     assert (robot.mission.state, robot.mission.reason) == ("blocked", WAITS)
-    robot.show(room())
+    robot.show(ROOM)
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
 
 

@@ -16,11 +16,14 @@ from fasaco_edge.mission.coverage.loop_closure import (
     Motion,
     has_moved,
     moved_cells,
+    small_shift,
     uncertain_cells,
 )
 from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from tests.mission.world import CELL, Drive, building, pixels, placed, pose_at
+from tests.mission.line_robot import CONFIG, PIXEL_M
+from tests.mission.test_reached_cells import changed, two_rooms
+from tests.mission.world import CELL, Drive, pixels, placed, pose_at, started
 
 FOOTPRINT = Footprint(0.3, 0.15)
 HOME = Pose2D(0.0, 0.0)
@@ -149,8 +152,7 @@ def closed(shift, *, together=True):
     """A robot on its path when the map moves by so many columns; the path ahead before that."""
     drive = Drive((1, 1), moved_hall(0), pose_at(1, 1))
     drive.plan()
-    for _ in range(4):
-        drive.go()
+    drive.go(times=4)
     ahead = [drive.cell, *drive.walk]
     row, col = drive.cell
     there = pose_at(row, col + shift)
@@ -195,8 +197,7 @@ def test_cells_of_a_turned_map_are_moved_one_by_one():
 
 
 def test_of_two_motions_the_path_before_the_first_moves_and_none_of_another_order_or_map():
-    drive = Drive((2, 2), MapReceived(building(*["." * 12] * 6)), pose_at(2, 2))
-    drive.plan()
+    drive = started(*["." * 12] * 6, cell=(2, 2))
     route, motion = drive.mission.route, drive.mission._handler.motion
     pose = pose_at(2, 2).pose.pose
     moved, path = replace(pose, x=pose.x + CELL), route.path.ahead
@@ -214,3 +215,73 @@ def test_of_two_motions_the_path_before_the_first_moves_and_none_of_another_orde
     motion.receive_map(pose)
     motion.leave_map()
     assert motion.receive_pose(moved) is None
+
+
+# Shifts of a map by a few pixels, and changes that are none.
+
+
+def shifted(before, after, right=0.0, up=0.0, yaw=0.0):
+    """The shift found between two maps, the second one moved by so many pixels, or None."""
+    grids = [
+        OccupancyGrid(GridGeometry(*pixels.shape, PIXEL_M, origin), np.ascontiguousarray(pixels))
+        for pixels, origin in (
+            (before, Pose2D(0.0, 0.0)),
+            (after, Pose2D(right * PIXEL_M, up * PIXEL_M, yaw)),
+        )
+    ]
+    found = small_shift(*grids, CONFIG.footprint)
+    return None if found is None else (found.end.x / PIXEL_M, found.end.y / PIXEL_M)
+
+
+@pytest.mark.parametrize("shift", [(1, 0), (-3, 2), (4, -4), (2.8, 0.0)])
+def test_a_map_that_was_shifted(shift):
+    assert shifted(two_rooms(is_open=True), two_rooms(is_open=True), *shift) == pytest.approx(
+        np.rint(shift)
+    )
+
+
+def test_a_map_with_walls_of_many_pixels():
+    walls = np.pad(two_rooms(is_open=True), 8, constant_values=100)
+    assert shifted(walls, walls, 3, 1) == pytest.approx((3, 1))
+
+
+def noisy(pixels, seed):
+    """The same with walls that are a pixel thicker in places, and specks."""
+    rng = np.random.default_rng(seed)
+    cells = pixels.copy()
+    beside = np.zeros(cells.shape, bool)
+    for axis, by in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        beside |= np.roll(pixels == 100, by, axis)
+    cells[beside & (rng.random(cells.shape) < 0.3)] = 100
+    cells[rng.random(cells.shape) < 0.01] = 100
+    return cells
+
+
+def furnished():
+    pixels = two_rooms(is_open=True)
+    pixels[10:20, 20:34] = pixels[30:44, 80:90] = 100
+    return pixels
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (two_rooms(is_open=True), two_rooms(is_open=True)),
+        (two_rooms(is_open=True), changed("closed")),
+        (two_rooms(is_open=True), changed("unknown")),
+        (two_rooms(is_open=True), furnished()),
+        (furnished(), two_rooms(is_open=True)),
+        (noisy(two_rooms(is_open=True), 1), noisy(two_rooms(is_open=True), 2)),
+        (two_rooms(is_open=True), np.zeros((52, 124), np.int8)),
+        (two_rooms(is_open=True), np.full((52, 124), 100, np.int8)),
+    ],
+    ids=["same", "door", "unknown", "furniture", "none", "noise", "no walls", "no floor"],
+)
+def test_a_map_that_was_not(before, after):
+    assert shifted(before, after) is None
+
+
+def test_noise_hides_no_shift():
+    assert shifted(
+        noisy(two_rooms(is_open=True), 1), noisy(two_rooms(is_open=True), 2), 3, 0
+    ) == pytest.approx((3, 0))

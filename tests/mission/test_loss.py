@@ -4,8 +4,7 @@ import pytest
 
 from fasaco_edge.errors import WouldForget
 from fasaco_edge.mission.events import MapReceived
-from fasaco_edge.mission.work.order_state import OrderState
-from tests.mission.world import Drive, building, pose_at, rectangle, started
+from tests.mission.world import building, idle, rectangle, started
 
 ROOM = ("........",) * 6
 EAST = {"zones": [{"name": "east", "polygon": rectangle(0, 6, 6, 8)}]}
@@ -38,6 +37,7 @@ def test_another_order_says_how_much_it_would_forget():
     # The cell under the tool stays covered.
     said = "start forgets 11 covered cells (0.7 m2), 23 % of the floor in reach"
     assert refused(drive, "start", OTHER) == said
+    assert "11 covered cells" in refused(drive, "start", {"keep_out": [rectangle(4, 4, 5, 5)]})
     drive.command("start", OTHER, discard=True)
     assert drive.refused is None
     assert drive.visited == {drive.cell}
@@ -52,23 +52,14 @@ def test_a_reset_says_how_much_it_would_forget():
     assert refused(drive, "reset") is None, "there is nothing left to forget"
 
 
-def test_a_keep_out_in_a_new_order_forgets_but_a_named_one_keeps():
-    drive = covering(12)
-    assert "11 covered cells" in refused(drive, "start", {"keep_out": [rectangle(4, 4, 5, 5)]})
-
-
-@pytest.mark.parametrize("order", [None, {"keep_covered": True}, {**OTHER, "keep_covered": True}])
+@pytest.mark.parametrize(
+    "order", [None, {"keep_covered": True}, {**OTHER, "keep_covered": True}, EAST]
+)
 def test_an_order_that_forgets_nothing_needs_no_consent(order):
-    drive = covering(12)
+    drive = covering(6)
     covered = drive.visited
     assert refused(drive, "start", order) is None
     assert covered <= drive.visited
-
-
-def test_a_zone_where_nothing_is_covered_needs_no_consent():
-    drive = covering(6)
-    assert not any(col >= 6 for _, col in drive.visited)
-    assert refused(drive, "start", EAST) is None
 
 
 def test_coverage_of_a_cancelled_order_is_forgotten_by_consent():
@@ -86,21 +77,15 @@ def test_a_finished_order_needs_no_consent():
 
 
 def test_a_robot_that_only_stands_there_loses_nothing():
-    drive = Drive(
-        (0, 0),
-        MapReceived(building(*ROOM)),
-        pose_at(0, 0),
-        order_state=OrderState.idle("no order yet"),
-    )
+    drive = idle(*ROOM)
     assert drive.visited == {(0, 0)}
     assert refused(drive, "start") is None
 
 
 def test_before_there_is_a_map_all_that_was_covered_counts():
-    kept = covering(12).mission.snapshot()
-    again = Drive((0, 0), order_state=OrderState.from_json(kept.note))
-    again.mission.restore(kept)
-    assert refused_without_map(again) == "start forgets 11 covered cells (0.7 m2)"
+    again = covering(12).restarted()
+    again.command("start", OTHER, discard=False)
+    assert str(again.refused) == "start forgets 11 covered cells (0.7 m2)"
 
 
 @pytest.mark.parametrize("at", [(0, 0), (40, 40)])
@@ -122,15 +107,8 @@ def test_covered_cells_of_a_zone_beyond_the_map_count():
     assert f"start forgets {len(inside)} covered cells" in refused(drive, "start", west)
 
 
-def refused_without_map(drive):
-    drive.command("start", OTHER, discard=False)
-    return str(drive.refused)
-
-
 def test_a_small_share_is_never_reported_as_nothing():
     """A share never rounds to nothing."""
-    drive = Drive((0, 0), MapReceived(building(*("." * 20,) * 20)), pose_at(0, 0))
-    drive.plan()
-    for _ in range(2):
-        drive.go()
+    drive = started(*("." * 20,) * 20)
+    drive.go(times=2)
     assert "2 covered cells (0.1 m2), less than 1 % of the floor" in refused(drive, "reset")

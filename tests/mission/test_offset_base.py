@@ -1,7 +1,5 @@
 """What a mission claims to be swept by a base that drives beside its line."""
 
-from __future__ import annotations
-
 import pytest
 
 from fasaco_edge.daemon.loop.mission_reports import floor_report
@@ -39,10 +37,7 @@ def test_strips_due_to_raster_differences_are_not_driven_to():
     assert abs(outcome.claimed - outcome.known) < 0.005
 
 
-@pytest.mark.parametrize(
-    ("poses_hz", "speed_m_s", "known"),
-    [(1.0, 0.7, 0.98), (0.5, 0.7, 0.7)],
-)
+@pytest.mark.parametrize(("poses_hz", "speed_m_s", "known"), [(1.0, 0.7, 0.98), (0.5, 0.7, 0.7)])
 def test_sparse_poses_are_joined_where_the_robot_can_have_driven(poses_hz, speed_m_s, known):
     outcome = driven(bare_room(), poses_hz=poses_hz, speed_m_s=speed_m_s, most_s=400.0)
     assert outcome.mission.state is State.DONE

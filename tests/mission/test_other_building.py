@@ -4,7 +4,7 @@ import pytest
 
 from fasaco_edge.errors import LedgerMismatchError
 from fasaco_edge.mission.events import MapReceived, State
-from tests.mission.world import Drive, building, patch, pose_at
+from tests.mission.world import Drive, building, patch, pose_at, robot_in
 
 HERE = (1, 1)
 # A floor of two rooms; another one, whose lift is at the same place; a hall without its walls.
@@ -24,18 +24,13 @@ OTHER = (
 )
 OPEN = ("." * 14,) * 12
 # As the first, and askew enough to look another way from the other side.
-CORNER = (
-    "##############",
-    *("#......#######",) * 5,
-    *("#............#",) * 5,
-    "##############",
-)
+CORNER = ("##############", *("#......#######",) * 5, *("#............#",) * 5, "##############")
 OLD, NEW = MapReceived(building(*FLOOR)), MapReceived(building(*OTHER))
 
 
 def swept(*rows, ticks=400):
     """A robot that has swept a floor, or a part of it, and is back at the lift."""
-    drive = Drive(HERE, MapReceived(building(*rows)), pose_at(*HERE))
+    drive = robot_in(*rows, cell=HERE)
     for _ in range(ticks):
         if drive.mission.state is State.DONE:
             break

@@ -10,15 +10,13 @@ from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.mission.core.lattice_layout import LatticeLayout
 from fasaco_edge.mission.events import CommandReceived, MapReceived, PlanReady, State
 from fasaco_edge.mission.orders.order import read_order
-from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.cost import SHORTEST_STEP_S, SearchWork
 from fasaco_edge.planners.passes import Laid
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.grid.test_floor import room
 from tests.mission import line_robot, world
-from tests.mission.test_control import cells, idle
-from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle
+from tests.mission.world import CONFIG, building, cells, idle, rectangle
 from tests.support.lanes import along_share
 
 HALL = ("............",) * 9
@@ -107,9 +105,7 @@ def test_a_last_lap_forgets_only_the_edge_of_its_zone():
 def test_an_edge_grows_with_the_map():
     drive = idle(*(row[:6] + "??????" for row in HALL))
     drive.command("start", {"passes": ["edge", "auto"]})
-    for _ in range(3):
-        drive.plan() if drive.request else None
-        drive.go()
+    drive.tick(times=3)
     drive.tell(MapReceived(building(*HALL)))
     (_, lap), _ = list(driven(drive).values())[-2:]
     assert cells(0, 6, 9, 12) & EDGE <= drive.visited
@@ -118,13 +114,7 @@ def test_an_edge_grows_with_the_map():
 
 
 def test_robots_of_a_fleet_have_no_cells_of_their_own():
-    drive = Drive(
-        (0, 0),
-        MapReceived(building(*HALL)),
-        pose_at(0, 0),
-        order_state=OrderState.idle("no order yet"),
-        kind=FleetKind("r1"),
-    )
+    drive = idle(*HALL, kind=FleetKind("r1"))
     for name, value in {"angle_deg": 20.0, "overlap": 0.3}.items():
         drive.command("start", {"passes": [{name: value}]})
         assert isinstance(drive.refused, OrderError)
@@ -273,8 +263,7 @@ def test_a_map_too_large_for_a_pass_gets_the_usual_cells():
 
 def test_a_slow_pass_is_sent_with_its_speed():
     config = replace(CONFIG, speed_m_s=0.25)
-    events = MapReceived(building(*HALL)), pose_at(0, 0)
-    drive = Drive((0, 0), *events, config=config, order_state=OrderState.idle("no order yet"))
+    drive = idle(*HALL, config=config)
     for speed, why in (
         (0.3, "expected at most robot.speed_m_s, 0.25, got 0.3"),
         (1e-300, "a cell in an hour, got 1e-300"),
@@ -294,6 +283,5 @@ def test_the_way_home_is_driven_at_the_usual_speed():
     drive = idle(*HALL)
     drive.command("start", {"passes": [{"speed_m_s": 0.1}]})
     drive.plan()
-    for _ in range(5):
-        drive.go()
+    drive.go(times=5)
     assert drive.command("home").path.speed_m_s is None

@@ -1,7 +1,5 @@
 """The contract of a path: it begins at the robot, and leads out of where the disc does not fit."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

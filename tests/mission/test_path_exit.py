@@ -3,8 +3,7 @@
 import pytest
 
 from fasaco_edge.mission.core.path_exit import PathExit
-from fasaco_edge.mission.events import MapReceived
-from tests.mission.world import Drive, building, pose_at
+from tests.mission.world import started
 
 ROOM = ["......"] * 4
 
@@ -29,8 +28,7 @@ class Sent:
 
 def driving():
     """A mission that drives, the exit with its path published, and what was sent."""
-    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
-    drive.plan()
+    drive = started(*ROOM)
     exit_, sent = PathExit(), Sent()
     exit_.follow(drive.mission, drive.updates[-1])
     exit_.send(sent)

@@ -11,11 +11,13 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.polygons import polygon_flaw
 from fasaco_edge.mission.orders.zones import cells_inside, counts_in, near_polygons, without
 from tests import naive
+from tests.mission import world
 from tests.support.examples import examples
 
 CELL_M = 0.3
 # Of ten cells by ten, some of them beyond the origin.
 WINDOW = Window(-3, -2, 7, 8)
+ALL_CELLS = world.cells(-3, -2, 7, 8)
 
 points = st.tuples(st.integers(-12, 30), st.integers(-12, 30)).map(
     lambda point: (point[0] / 10 + 0.00311, point[1] / 10 - 0.00717)
@@ -52,19 +54,11 @@ def cells(mask):
     return {(int(r) + WINDOW.row0, int(c) + WINDOW.col0) for r, c in np.argwhere(mask)}
 
 
-def all_cells():
-    return [
-        (row, col)
-        for row in range(WINDOW.row0, WINDOW.row1)
-        for col in range(WINDOW.col0, WINDOW.col1)
-    ]
-
-
 @examples(150)
 @given(polygons)
 def test_a_zone_holds_the_cells_whose_centre_it_holds(polygon):
     assume(not polygon_flaw(polygon))
-    expected = {cell for cell in all_cells() if is_inside(centre(*cell), polygon)}
+    expected = {cell for cell in ALL_CELLS if is_inside(centre(*cell), polygon)}
     assert cells(cells_inside(polygon, WINDOW, CELL_M)) == expected
     backwards = cells_inside(polygon[::-1], WINDOW, CELL_M)
     assert cells(backwards) == expected
@@ -75,8 +69,8 @@ def test_a_zone_holds_the_cells_whose_centre_it_holds(polygon):
 def test_near_is_what_the_polygon_touches(polygon, reach):
     assume(not polygon_flaw(polygon))
     near = cells(near_polygons((polygon,), WINDOW, CELL_M, reach))
-    sure = {cell for cell in all_cells() if comes_near(centre(*cell), polygon, reach - 0.004)}
-    possible = {cell for cell in all_cells() if comes_near(centre(*cell), polygon, reach + 0.004)}
+    sure = {cell for cell in ALL_CELLS if comes_near(centre(*cell), polygon, reach - 0.004)}
+    possible = {cell for cell in ALL_CELLS if comes_near(centre(*cell), polygon, reach + 0.004)}
     assert sure <= near <= possible
 
 

@@ -1,7 +1,5 @@
 """The published line holds still for the next metres, and changes far ahead wait."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -17,14 +15,20 @@ ZIGZAG = np.array([(0.4 * number, 0.3 * (number % 2)) for number in range(60)])
 EDGE_M = 0.5
 
 
+@pytest.fixture
+def published():
+    """The zigzag, published as a whole."""
+    published = PublishedLine(0.25)
+    published.record_published(ZIGZAG, len(ZIGZAG))
+    return published
+
+
 def look(published, line, now=0.0, *, is_settled=True, leads_on=False):
     published.compare(line)
     return published.is_due(now, is_settled, lambda points: leads_on)
 
 
-def test_a_change_waits_until_the_robot_is_near():
-    published = PublishedLine(0.25)
-    published.record_published(ZIGZAG, len(ZIGZAG))
+def test_a_change_waits_until_the_robot_is_near(published):
     assert not look(published, ZIGZAG)
     changed = ZIGZAG.copy()
     changed[12] += 0.1
@@ -33,9 +37,7 @@ def test_a_change_waits_until_the_robot_is_near():
     assert due_at == [number for number in range(12) if (11 - number) * EDGE_M <= 2.25]
 
 
-def test_a_near_change_waits_briefly_for_a_running_plan():
-    published = PublishedLine(0.25)
-    published.record_published(ZIGZAG, len(ZIGZAG))
+def test_a_near_change_waits_briefly_for_a_running_plan(published):
     cut = ZIGZAG[:5]
     assert not look(published, cut, 1.0, is_settled=False)
     assert not look(published, cut, 1.9, is_settled=False)
@@ -44,15 +46,11 @@ def test_a_near_change_waits_briefly_for_a_running_plan():
 
 
 @pytest.mark.parametrize("left", [1, 2, 3])
-def test_a_change_just_ahead_does_not_wait(left):
-    published = PublishedLine(0.25)
-    published.record_published(ZIGZAG, len(ZIGZAG))
+def test_a_change_just_ahead_does_not_wait(published, left):
     assert look(published, ZIGZAG[:left], is_settled=False)
 
 
-def test_a_published_line_that_leads_on_waits_for_the_plan():
-    published = PublishedLine(0.25)
-    published.record_published(ZIGZAG, len(ZIGZAG))
+def test_a_published_line_that_leads_on_waits_for_the_plan(published):
     assert not look(published, ZIGZAG[:2], 1.0, is_settled=False, leads_on=True)
     assert look(published, ZIGZAG[:2], 1.1, is_settled=False, leads_on=False)
     assert look(published, ZIGZAG[:2], 2.0, is_settled=False, leads_on=True)
@@ -75,9 +73,7 @@ def test_a_line_that_ends_at_the_robot_is_published_once():
     assert look(published, ZIGZAG, 2.0)
 
 
-def test_the_published_line_is_held_as_far_as_it_is_polished():
-    published = PublishedLine(0.25)
-    published.record_published(ZIGZAG, len(ZIGZAG))
+def test_the_published_line_is_held_as_far_as_it_is_polished(published):
     published.compare(ZIGZAG)
     assert (published.held - 1) * EDGE_M == pytest.approx(HELD_M, abs=EDGE_M)
     published.compare(ZIGZAG[4:])
@@ -94,8 +90,7 @@ def test_pixels_that_flicker_far_ahead_change_nothing_yet():
 
 def changes_nearby(seed):
     """Return how often the next metres changed in two minutes of flicker."""
-    pixels = np.full((80, 120), 100, np.int8)
-    pixels[1:-1, 1:-1] = 0
+    pixels = room(6.0, 4.0)
     random = np.random.default_rng(seed)
     robot = LineRobot(pixels, (1.0, 1.0))
     robot.wait(3.0, lambda robot: False)
@@ -116,8 +111,7 @@ def changes_nearby(seed):
 
 def test_a_robot_that_stands_gets_a_new_path_at_once():
     """On a bench, say, where somebody publishes maps and waits for paths."""
-    pixels = np.full((80, 120), 100, np.int8)
-    pixels[1:-1, 1:-1] = 0
+    pixels = room(6.0, 4.0)
     robot = LineRobot(pixels, (1.0, 1.0))
     robot.wait(3.0, lambda robot: False)
     robot.is_stuck = True

@@ -1,14 +1,12 @@
 """A full new plan, asked for."""
 
-from __future__ import annotations
-
 import pytest
 
 from fasaco_edge.errors import CommandError
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.mission.work.order_state import OrderState
-from tests.mission.world import Drive, building, pose_at, started
+from tests.mission.world import Drive, building, pose_at, robot_in, started
 
 ROOM = ("........",) * 6
 
@@ -38,7 +36,7 @@ def test_only_the_plan_that_was_asked_for_is_a_full_one():
 
 
 def test_one_under_way_comes_first():
-    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
+    drive = robot_in(*ROOM)
     assert drive.request.number == 1
     for _ in range(2):
         (answer,) = drive.command("replan").answers
@@ -51,7 +49,7 @@ def test_one_under_way_comes_first():
 
 
 def test_a_map_change_does_not_hide_a_requested_replan():
-    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
+    drive = robot_in(*ROOM)
     drive.command("replan")
     drive.tell(MapReceived(building(*ROOM, "...#....")))
     assert drive.plan().plan.reason == "asked for"
@@ -63,7 +61,7 @@ def test_a_map_change_does_not_hide_a_requested_replan():
         (lambda: Drive((0, 0)), "there is no map yet"),
         (lambda: Drive((0, 0), MapReceived(building(*ROOM))), "there is no pose yet"),
         (lambda: Drive((0, 0), order_state=OrderState.idle("")), "there is no mission"),
-        (lambda: Drive((9, 9), MapReceived(building(*ROOM)), pose_at(9, 9)), "outside of the map"),
+        (lambda: robot_in(*ROOM, cell=(9, 9)), "outside of the map"),
     ],
 )
 def test_a_replan_without_work_is_refused_with_the_reason(drive, said):

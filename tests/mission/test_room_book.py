@@ -1,7 +1,5 @@
 """Rooms keep number, name and settings, whatever the map does: hand-drawn regions in a table."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

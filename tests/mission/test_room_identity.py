@@ -1,7 +1,5 @@
 """Names of rooms through a mission in a generated home: maps that grow, flicker, and are moved."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.fleet.mission.kind import FleetKind
-from fasaco_edge.mission.events import MapReceived, MemberReceived
+from fasaco_edge.mission.events import MemberReceived
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 from fasaco_edge.mission.work.present_part import MAX_IN_VAIN
 from tests.mission.test_room_orders import (
@@ -14,17 +14,15 @@ from tests.mission.test_room_orders import (
     EAST_COLUMNS,
     IN_EAST,
     IN_WEST,
-    WAITS,
     WEST_COLUMNS,
     name,
     room_at,
-    settle,
     settled,
     visited,
 )
 from tests.mission.test_worth import TIGHT_MIN, tick
 from tests.mission.test_worth import finish as finish_slowly
-from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle, with_policy
+from tests.mission.world import CONFIG, pose_at, rectangle, robot_in, with_policy
 
 ALWAYS = with_policy(CONFIG, by_room="always")
 
@@ -67,7 +65,7 @@ def test_a_room_is_finished_before_the_next_is_begun(order, sides):
 
 
 def test_once_rooms_are_known_the_robot_finishes_its_own():
-    drive = Drive(IN_WEST, MapReceived(building(*BOTH)), pose_at(*IN_WEST), config=ALWAYS)
+    drive = robot_in(*BOTH, cell=IN_WEST, config=ALWAYS)
     assert planned(drive) == (89, 90)
     drive.plan()
     while drive.request is None:
@@ -117,8 +115,7 @@ def test_the_order_is_done_while_people_change_the_rooms(change):
     west, east = room_at(drive, *IN_WEST).id, room_at(drive, *IN_EAST).id
     drive.command("start")
     drive.plan()
-    for _ in range(30):
-        drive.go()
+    drive.go(times=30)
     request = {
         "split": RoomRequest(west, cut=((0.0, 1.25), (2.5, 1.25))),
         "merge": RoomRequest(west, others=(east,)),
@@ -148,8 +145,7 @@ def test_another_order_begins_in_the_robots_own_room():
     drive = settled(*BOTH, config=ALWAYS)
     drive.command("start")
     drive.plan()
-    for _ in range(5):
-        drive.go()
+    drive.go(times=5)
     drive.command("cancel")
     drive.cell = IN_EAST
     drive.tell(pose_at(*IN_EAST))
@@ -179,15 +175,7 @@ def test_priority_comes_before_the_room_that_the_robot_is_in():
 
 
 def test_robots_of_a_fleet_share_rooms_as_with_auto():
-    drive = Drive(
-        IN_WEST,
-        MapReceived(building(*BOTH)),
-        pose_at(*IN_WEST),
-        order_state=WAITS,
-        config=ALWAYS,
-        kind=FleetKind("r1"),
-    )
-    settle(drive)
+    drive = settled(*BOTH, config=ALWAYS, kind=FleetKind("r1"))
     drive.command("start")
     assert planned(drive) == (89, 0)
     drive.plan()

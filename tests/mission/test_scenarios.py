@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.errors import MapTooLarge, PatchWithoutBase, WrongFrame
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
+from fasaco_edge.errors import MapTooFar, MapTooLarge, PatchWithoutBase, WrongFrame
+from fasaco_edge.grid.geometry import FARTHEST_M, GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
@@ -21,6 +21,7 @@ from fasaco_edge.mission.events import (
 )
 from fasaco_edge.planners.path import CoveragePath
 from tests.mission.world import (
+    CELL,
     Drive,
     answer,
     building,
@@ -28,6 +29,7 @@ from tests.mission.world import (
     placed,
     pose_at,
     reachable_cells,
+    robot_in,
     started,
 )
 
@@ -55,7 +57,7 @@ def test_a_mission_waits_for_map_then_pose_then_requests_a_plan():
 
 
 def test_a_plan_that_comes_back_is_published():
-    drive = Drive((1, 2), MapReceived(building(*ROOM)), pose_at(1, 2))
+    drive = robot_in(*ROOM, cell=(1, 2))
     request = drive.request
     decision = drive.plan()
     assert drive.mission.state is State.COVERING
@@ -103,8 +105,7 @@ def test_a_map_that_touches_no_reachable_cell_changes_nothing():
 
 def test_a_grown_map_requests_a_plan_of_what_is_not_covered():
     drive = started("...", "...", cell=(1, 0))
-    for _ in range(2):
-        drive.go()
+    drive.go(times=2)
     here, visited = drive.cell, drive.visited
     assert len(visited) == 3
     decision = drive.tell(MapReceived(building("???..", "...##", "...??", "...??", at=(-1, 0))))
@@ -125,8 +126,7 @@ def test_a_grown_map_requests_a_plan_of_what_is_not_covered():
 
 def test_a_wall_across_the_path_cuts_it_at_the_last_legal_cell():
     drive = started(*CORRIDOR)
-    for _ in range(3):
-        drive.go()
+    drive.go(times=3)
     decision = drive.tell(patch("#", at=(0, 6)))
     assert decision.path.cells.tolist() == [[0, 3], [0, 4], [0, 5]]
     assert decision.path.reason == "path blocked at cell (0, 6)"
@@ -155,8 +155,7 @@ def test_a_closed_passage_between_reachable_cells_is_a_change():
 
 def test_a_robot_inside_a_wall_stops_and_says_why_and_recovers():
     drive = started("........", "........", "..####..", "..####..", "..####..", "..####..")
-    for _ in range(2):
-        drive.go()
+    drive.go(times=2)
     decision = drive.tell(pose_at(1, 3))
     assert drive.mission.state is State.BLOCKED
     reason = (
@@ -194,7 +193,7 @@ def test_a_map_that_jumps_far_away_takes_no_memory_in_between():
 
 
 def test_a_plan_that_comes_while_blocked_is_not_published():
-    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
+    drive = robot_in(*ROOM)
     drive.tell(MapReceived(building(*["######"] * 4)))
     decision = drive.plan()
     assert decision == Decision()
@@ -204,12 +203,10 @@ def test_a_plan_that_comes_while_blocked_is_not_published():
 
 
 def test_a_plan_that_a_map_change_made_illegal_is_refused():
-    drive = Drive((0, 0), MapReceived(building(*CORRIDOR)), pose_at(0, 0))
-    stale = answer(drive.request)
+    drive = robot_in(*CORRIDOR)
     # The plan is still being made: no second one is asked for.
     assert drive.tell(patch("#", at=(0, 6))) == Decision()
-    drive.request = None
-    decision = drive.tell(stale)
+    decision = drive.plan()
     assert decision.path is None
     assert decision.plan.problem.cells == 5
     assert decision.plan.reason == "map: 4 cells fewer"
@@ -219,10 +216,8 @@ def test_a_plan_that_a_map_change_made_illegal_is_refused():
 
 def test_a_plan_still_legal_after_a_map_change_is_driven():
     drive = Drive((0, 0), MapReceived(building(*CORRIDOR, "##########")), pose_at(1, 0))
-    stale = answer(drive.request)
     drive.tell(patch(".", at=(0, 9)))
-    drive.request = None
-    decision = drive.tell(stale)
+    decision = drive.plan()
     assert decision.path.cells[-1].tolist() == [1, 9]
     assert decision.plan.reason == "map: 1 cell more"
 
@@ -230,19 +225,16 @@ def test_a_plan_still_legal_after_a_map_change_is_driven():
 def test_a_plan_leaves_out_what_was_driven_while_it_was_made():
     drive = started(*CORRIDOR)
     drive.tell(patch("#", at=(0, 9)))
-    stale = answer(drive.request)
-    drive.request = None
-    for _ in range(4):
-        drive.go()
+    drive.go(times=4)
     revision = drive.mission.route.revision
     # The rest of the plan is what is being driven: nobody needs to hear of it again.
-    assert drive.tell(stale).path is None
+    assert drive.plan().path is None
     assert drive.mission.route.revision == revision
     assert drive.mission.route.path.ahead.tolist() == [[0, col] for col in range(4, 9)]
 
 
 def test_an_answer_to_another_question_leaves_the_question_open():
-    drive = Drive((0, 0), MapReceived(building(*CORRIDOR)), pose_at(0, 0))
+    drive = robot_in(*CORRIDOR)
     path = CoveragePath(np.array([[0, 0], [0, 1]], np.int32), "fasaco", 0)
     assert drive.tell(PlanReady(drive.request.number + 1, path, 0.1)) == Decision()
     assert drive.mission.route.requests.is_planning
@@ -263,21 +255,6 @@ def fault_of(drive, event):
     assert (drive.visited, mission.covered.current.total) == (visited, total)
     (fault,) = decision.faults
     return fault
-
-
-def test_an_update_before_any_map_is_a_fault():
-    drive = Drive((0, 0))
-    (fault,) = drive.tell(patch("#")).faults
-    assert isinstance(fault, PatchWithoutBase)
-    assert str(fault) == "map update refused: there is no map yet"
-    assert drive.mission.state is State.WAITING_FOR_MAP
-
-
-def test_an_update_that_does_not_fit_is_a_fault():
-    drive = started(*ROOM)
-    for event in (patch("#", at=(0, 6)), patch("##", at=(3, 5)), patch(".", frame="odom")):
-        assert isinstance(fault_of(drive, event), PatchWithoutBase)
-    drive.finish()
 
 
 def test_updates_of_one_cycle_are_one_change_of_the_map():
@@ -307,19 +284,27 @@ def test_after_lost_updates_only_a_full_map_counts():
     assert np.count_nonzero(drive.mission.map.area.reachable) == 23
 
 
-def test_a_pose_or_map_in_another_frame_is_a_fault():
-    drive = started(*ROOM)
-    fault = fault_of(drive, pose_at(2, 2, frame="odom"))
-    assert isinstance(fault, WrongFrame)
-    assert str(fault) == "pose in frame 'odom', map in 'map'"
-    assert isinstance(fault_of(drive, MapReceived(building(*ROOM, frame="odom"))), WrongFrame)
-    drive.finish()
+HUGE = OccupancyGrid(GridGeometry(2, 2, 1e4, Pose2D(0, 0)), np.zeros((2, 2), np.int8))
+FAR = building(*ROOM, at=(0, round(FARTHEST_M / CELL)))
 
 
-def test_a_map_too_large_is_a_fault_and_the_old_one_stays():
+@pytest.mark.parametrize(
+    ("event", "fault", "said"),
+    [
+        (patch("#", at=(0, 6)), PatchWithoutBase, "update "),
+        (patch("##", at=(3, 5)), PatchWithoutBase, "update "),
+        (patch(".", frame="odom"), PatchWithoutBase, "update "),
+        (pose_at(2, 2, frame="odom"), WrongFrame, "pose in frame 'odom', map in 'map'"),
+        (MapReceived(building(*ROOM, frame="odom")), WrongFrame, "map in frame 'odom', "),
+        (MapReceived(HUGE), MapTooLarge, ""),
+        (MapReceived(FAR), MapTooFar, ""),
+    ],
+)
+def test_what_cannot_be_used_is_a_fault_and_changes_nothing(event, fault, said):
     drive = started(*ROOM)
-    huge = OccupancyGrid(GridGeometry(2, 2, 1e4, Pose2D(0, 0)), np.zeros((2, 2), np.int8))
-    assert isinstance(fault_of(drive, MapReceived(huge)), MapTooLarge)
+    found = fault_of(drive, event)
+    assert isinstance(found, fault)
+    assert str(found).startswith(said)
     drive.finish()
 
 
@@ -329,6 +314,7 @@ def test_a_bad_event_does_not_affect_the_others():
         patch("#"), MapReceived(building(*ROOM)), pose_at(0, 0, frame="odom"), pose_at(0, 0)
     )
     assert [type(fault) for fault in decision.faults] == [PatchWithoutBase, WrongFrame]
+    assert str(decision.faults[0]) == "map update refused: there is no map yet"
     assert decision.plan.problem.start == (0, 0)
 
 

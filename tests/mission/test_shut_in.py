@@ -1,7 +1,5 @@
 """A robot that the map shuts in where it has just driven in."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from fasaco_edge.mission.orders.keep_outs import KeepOut

@@ -7,20 +7,15 @@ import pytest
 
 from fasaco_edge.daemon.loop.outbox import path_attachment
 from fasaco_edge.mission.core.path_exit import PublishedPath
-from fasaco_edge.mission.events import MapReceived, PlanReady
-from fasaco_edge.mission.path.plan_requests import (
-    NEW_WALK_SHARE,
-    SKIPPED_S,
-    Attempt,
-    SpareTime,
-)
+from fasaco_edge.mission.events import PlanReady
+from fasaco_edge.mission.path.plan_requests import NEW_WALK_SHARE, SKIPPED_S, Attempt, SpareTime
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.planners.walk_before import HELD_CELLS
 from tests.benchmarks.judge import check_walk
-from tests.mission.world import CONFIG, Drive, building, patch, pose_at
+from tests.mission.world import CONFIG, patch, pose_at, robot_in
 
 HALL = ["." * 12 for _ in range(12)]
 SHARE = 0.1
@@ -52,7 +47,7 @@ def whole(request, rest):
 def driving(share=SHARE, gap=4):
     """Return a robot that has been given a path that is poor further on."""
     config = replace(CONFIG, spare_share=share, cost=CoverageCost())
-    drive = Drive((0, 0), MapReceived(building(*HALL)), pose_at(0, 0), config=config)
+    drive = robot_in(*HALL, config=config)
     request, drive.request = drive.request, None
     drive.tell(plan(request, lanes(12, 12, gap)))
     return drive
@@ -96,9 +91,8 @@ def test_a_new_walk_has_to_save_more(times, is_taken):
     side, cost = 30, CoverageCost()
     best = lanes(side, side, side)
     poor = np.concatenate((best, *[best[[-2, -1]]] * times))
-    hall = MapReceived(building(*["." * side] * side))
     config = replace(CONFIG, spare_share=SHARE, cost=cost)
-    drive = Drive((0, 0), hall, pose_at(0, 0), config=config)
+    drive = robot_in(*["." * side] * side, config=config)
     request, drive.request = drive.request, None
     drive.tell(plan(request, poor))
     request, drive.request = drive.request, None
@@ -181,16 +175,14 @@ def test_attempts_take_their_share_of_the_time_and_less_in_vain():
 def test_a_hopeless_attempt_is_not_repeated_with_each_pose(monkeypatch):
     """All is covered, but the path leads on: to find that out takes a look at the whole map."""
     config = replace(CONFIG, spare_share=1.0)
-    drive = Drive((0, 0), MapReceived(building(*HALL[:3])), pose_at(0, 0), config=config)
+    drive = robot_in(*HALL[:3], config=config)
     request, drive.request = drive.request, None
     hall = lanes(3, 12, 3)
     drive.tell(plan(request, np.concatenate((hall, hall[-2::-1], hall[1:]))))
     tried_at = []
     attempt_at = Attempt.at
     monkeypatch.setattr(
-        Attempt,
-        "at",
-        lambda *asked, **how: tried_at.append(drive.now) or attempt_at(*asked, **how),
+        Attempt, "at", lambda *asked, **how: tried_at.append(drive.now) or attempt_at(*asked, **how)
     )
     for cell in hall.tolist():
         drive.tell(pose_at(*cell))

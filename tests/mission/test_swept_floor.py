@@ -8,12 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.mission.coverage.floor_tiles import (
-    FLOOR_TILE,
-    NO_FLOOR,
-    PIXEL_M,
-    pixels_under,
-)
+from fasaco_edge.mission.coverage.floor_tiles import FLOOR_TILE, NO_FLOOR, PIXEL_M, pixels_under
 from fasaco_edge.mission.coverage.loop_closure import Motion, certain_floor
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.steady_track import PoseScatter, SteadyTrack
@@ -25,7 +20,7 @@ from fasaco_edge.mission.coverage.swept_floor import (
     MOST_FLOOR_TILES,
     SweptFloor,
 )
-from tests.mission.world import CELL, Drive, MapReceived, building, pose_at, rectangle
+from tests.mission.world import CELL, rectangle, started
 from tests.support.examples import examples
 
 TOOL = 0.3
@@ -102,13 +97,6 @@ def test_a_jump_of_the_pose_sweeps_nothing():
     jumped = drive((0.0, 0.0), (JUMP_TOOLS * TOOL + 0.01, 0.0))
     assert not jumped.swept_in(Window(-1, 10, 1, 14)).any()
     assert drive((0.0, 0.0), (JUMP_TOOLS * TOOL, 0.0)).swept_in(Window(-1, 10, 1, 14)).all()
-
-
-def test_an_unknown_track_sweeps_nothing():
-    floor = drive((0.0, 0.0))
-    floor.break_track()
-    floor.record(Pose2D(0.5, 0.0))
-    assert not floor.swept_in(Window(-1, 8, 1, 12)).any()
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, math.pi / 2, -2.0])
@@ -303,8 +291,7 @@ def test_a_robot_that_stood_still_forgets_no_floor():
 
 
 def test_a_second_pass_forgets_the_floor_of_its_zone():
-    drive = Drive((0, 0), MapReceived(building("........")), pose_at(0, 0))
-    drive.plan()
+    drive = started("........")
     drive.finish()
     whole = drive.mission.covered.floor.pixels
     zone = {"name": "east", "polygon": rectangle(0, 0, 1, 4), "passes": 1}
@@ -382,7 +369,7 @@ def test_a_map_that_jumps_thousands_of_km_leaves_no_floor_sure():
 def test_poses_that_scatter_over_a_hall_take_no_memory():
     errors = np.random.default_rng(0).normal(0.0, 8.0, (60, 2)).tolist()
     floor = drive(*[(2.0 * n + dx, dy) for n, (dx, dy) in enumerate(errors)], tool_m=10.0)
-    for n, (dx, dy) in enumerate(errors):
+    for n, (dx, dy) in enumerate(errors[:20]):
         floor.record(Pose2D(120.0 + 9.0 * n + 0.1 * dx, 0.1 * dy))
         place, ahead = floor._swept_ahead()
         assert ahead.size <= MOST_AHEAD

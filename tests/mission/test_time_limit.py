@@ -107,16 +107,20 @@ def test_new_floor_does_not_reopen_an_order_out_of_time():
     assert (drive.mission.state, drive.request) == (State.DONE, None)
 
 
-@pytest.mark.parametrize("covered", [3, 20])
-def test_the_time_limit_survives_a_restart(covered):
-    drive = Clocked(order={"until_min": 1.0})
-    drive.run(State.COVERING)
-    for _ in range(covered):
-        drive.go()
+def restart(drive):
+    """Let another mission go on from what is kept, with the same clocks."""
     kept = drive.mission.snapshot()
     drive.mission, drive.request = Mission(drive.config), None
     drive.mission.restore(kept, OrderState.from_json(kept.note))
     drive.revision, drive.walk = 0, []
+
+
+@pytest.mark.parametrize("covered", [3, 20])
+def test_the_time_limit_survives_a_restart(covered):
+    drive = Clocked(order={"until_min": 1.0})
+    drive.run(State.COVERING)
+    drive.go(times=covered)
+    restart(drive)
     drive.tell(MapReceived(building(*HALL)), pose_at(*drive.cell), after=1000.0)
     left_s = drive.mission.time_limit.left_s
     assert 60.0 - covered - 8.0 <= left_s <= 60.0 - covered + 8.0
@@ -128,10 +132,7 @@ def test_the_time_limit_survives_a_restart(covered):
 def test_a_first_pose_and_a_clock_that_is_set_on_take_no_time():
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
-    kept = drive.mission.snapshot()
-    drive.mission, drive.request = Mission(drive.config), None
-    drive.mission.restore(kept, OrderState.from_json(kept.note))
-    drive.revision, drive.walk = 0, []
+    restart(drive)
     drive.tell(MapReceived(building(*HALL)))
     for stamp_s in (1_700_000_000, 1_700_003_600):
         pose = replace(pose_at(*drive.cell).pose, stamp_ns=stamp_s * 10**9)
@@ -144,11 +145,9 @@ def test_a_first_pose_and_a_clock_that_is_set_on_take_no_time():
 def test_pauses_count_and_a_paused_robot_stands():
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
-    for _ in range(10):
-        drive.go()
+    drive.go(times=10)
     drive.command("pause")
-    for _ in range(90):
-        drive.go()
+    drive.go(times=90)
     assert drive.mission.state is State.PAUSED
     drive.command("resume")
     drive.finish(ticks=20)
@@ -158,12 +157,10 @@ def test_pauses_count_and_a_paused_robot_stands():
 def test_the_order_of_a_robot_that_was_sent_home_ends_there():
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
-    for _ in range(10):
-        drive.go()
+    drive.go(times=10)
     drive.command("home")
     drive.run(State.PAUSED)
-    for _ in range(60):
-        drive.go()
+    drive.go(times=60)
     assert (drive.mission.state, drive.cell) == (State.DONE, (0, 0))
     assert drive.mission.reason.startswith("time is up after 1 min: ")
 

@@ -1,7 +1,5 @@
 """A tool wider than the robot sweeps nothing behind walls."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The living trail through a mission: it follows map, paths and robot, and outlives a restart."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -11,16 +9,9 @@ from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.living_trail import branching
-from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, started
+from tests.mission.world import CELL, CONFIG, building, patch, pose_at, robot_in, started
 
-ROOMS = (
-    "..........",
-    "..........",
-    "....##....",
-    "....##....",
-    "..........",
-    "..........",
-)
+ROOMS = ("..........", "..........", "....##....", "....##....", "..........", "..........")
 TAU0 = np.float32(CONFIG.trail.tau0)
 
 
@@ -41,12 +32,10 @@ def along(drive, cells):
 
 def growing():
     """A mission over a map that grows twice, and in which a box appears."""
-    drive = Drive((0, 0), MapReceived(building(*(row[:4] for row in ROOMS))), pose_at(0, 0))
+    drive = robot_in(*(row[:4] for row in ROOMS))
     for tick in range(300):
         if drive.mission.state == "done":
             return drive
-        if drive.request is not None:
-            drive.plan()
         news = []
         if tick == 5:
             news = [MapReceived(building(*(row[:7] for row in ROOMS)))]
@@ -54,7 +43,7 @@ def growing():
             news = [MapReceived(building(*ROOMS))]
         elif tick == 20:
             news = [patch("##", at=(0, 8))]
-        drive.go(*news)
+        drive.tick(*news)
         steps = drive.mission.lattice.steps
         legal = (steps[..., np.newaxis] >> np.arange(4)) & 1
         np.testing.assert_array_equal(tau_of(drive) > 0, legal > 0)
@@ -69,7 +58,7 @@ def test_a_trail_has_each_maps_steps_and_repeats_bit_for_bit():
 
 
 def test_a_planned_path_strengthens_it_and_what_was_driven_fades():
-    drive = Drive((0, 0), MapReceived(building(*ROOMS)), pose_at(0, 0))
+    drive = robot_in(*ROOMS)
     assert branching(tau_of(drive)) > 2
     np.testing.assert_array_equal(tau_of(drive)[tau_of(drive) > 0], TAU0)
     drive.plan()
@@ -77,8 +66,7 @@ def test_a_planned_path_strengthens_it_and_what_was_driven_fades():
     planned = along(drive, walk)
     assert (planned > 1.5 * TAU0).all()
     assert branching(tau_of(drive)) < 1.5
-    for _ in range(5):
-        drive.go()
+    drive.go(times=5)
     np.testing.assert_allclose(along(drive, walk[:6]), (planned[:5] + TAU0) / 2, rtol=1e-6)
     np.testing.assert_array_equal(along(drive, walk[5:]), planned[5:])
 
@@ -98,8 +86,7 @@ def test_a_path_that_is_only_cut_off_strengthens_no_trail():
 
 def test_the_trail_continues_after_a_restart():
     drive = started(*ROOMS)
-    for _ in range(8):
-        drive.go()
+    drive.go(times=8)
     before = drive.mission.snapshot()
     kept = decode_ledger(encode_ledger(before), CELL)
     np.testing.assert_allclose(kept.trail.tau, before.trail.tau, rtol=0.004)
@@ -127,10 +114,8 @@ WALLED = ("############", *(f"#{row}#" for row in ROOMS), "############")
 
 @pytest.mark.parametrize("together", [True, False])
 def test_a_loop_closure_takes_it_along(together):
-    drive = Drive((1, 1), MapReceived(building(*WALLED)), pose_at(1, 1))
-    drive.plan()
-    for _ in range(4):
-        drive.go()
+    drive = started(*WALLED, cell=(1, 1))
+    drive.go(times=4)
     before, walk = tau_of(drive), drive.walk[:]
     row, col = drive.cell
     moved, there = MapReceived(building(*WALLED, at=(0, 3))), pose_at(row, col + 3)
@@ -149,8 +134,7 @@ def test_a_loop_closure_takes_it_along(together):
 
 
 def test_a_plan_starts_from_the_trail():
-    first = MapReceived(building(*ROOMS)), pose_at(0, 0)
-    drive = Drive((0, 0), *first)
+    drive = robot_in(*ROOMS)
     np.testing.assert_array_equal(drive.request.problem.trail.tau, tau_of(drive))
     drive.plan()
     seen = drive.request
@@ -162,12 +146,7 @@ def test_a_plan_starts_from_the_trail():
 def test_missions_on_the_living_trail_are_reproducible():
     drives = []
     for _ in range(2):
-        drive = Drive(
-            (0, 0),
-            MapReceived(building(*(row[:5] for row in ROOMS))),
-            pose_at(0, 0),
-        )
-        drive.plan()
+        drive = started(*(row[:5] for row in ROOMS))
         drive.go(MapReceived(building(*ROOMS)))
         drive.finish()
         drives.append(drive)

@@ -21,6 +21,7 @@ from tests.mission.world import (
     placed,
     pose_at,
     rectangle,
+    started,
     with_policy,
 )
 from tests.support.examples import examples
@@ -32,10 +33,8 @@ WATCHFUL = with_policy(CONFIG, lost_pose_s=2.0, stale_map_s=60.0)
 
 
 def driving(*rows, steps=4, config=WATCHFUL):
-    drive = Drive((0, 0), MapReceived(building(*rows)), pose_at(0, 0), config=config)
-    drive.plan()
-    for _ in range(steps):
-        drive.go()
+    drive = started(*rows, config=config)
+    drive.go(times=steps)
     return drive
 
 
@@ -63,10 +62,7 @@ def test_cells_between_poses_far_apart_in_time_are_not_claimed():
         assert ((0, 2) in drive.visited) is claimed
         assert (0, 3) in drive.visited
         drive.walk = [(0, 4), (0, 5)]
-        for _ in range(40):
-            if drive.request is not None:
-                drive.plan()
-            drive.go()
+        drive.tick(times=40)
         assert drive.visited == {(0, col) for col in range(6)}
         assert drive.mission.state is State.DONE
 

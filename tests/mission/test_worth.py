@@ -1,7 +1,5 @@
 """Floor by its priority: what comes first where time or battery do not allow all."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import numpy as np
@@ -39,9 +37,7 @@ TIGHT_MIN = 2.5
 
 
 def tick(drive):
-    if drive.request is not None:
-        drive.plan()
-    drive.go()
+    drive.tick()
     drive.tell(after=0.9)
 
 
@@ -126,10 +122,9 @@ def test_the_rest_follows_where_time_is_left_after_all():
 def test_the_battery_is_a_limit_too():
     shares = []
     for priority in None, 80:
-        drive = Battery(0.9, cell=IN_WEST, rows=BOTH, order_state=WAITS, dock=None)
+        drive = Battery(0.9, cell=IN_WEST, rows=BOTH, order_state=WAITS, dock=None, drain=0.005)
         settle(drive)
         drive.level = 0.9
-        drive.mission.charging.gauge._drains.extend([0.005] * 5)
         number = room_at(drive, *IN_EAST).id
         if priority:
             drive.command("room_set", room=RoomRequest(number, priority=priority))

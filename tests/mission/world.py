@@ -25,6 +25,7 @@ from fasaco_edge.mission.events import (
     State,
 )
 from fasaco_edge.mission.orders.order import read_order
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.paper.fasaco import Fasaco
 from tests import naive
@@ -34,6 +35,7 @@ FOOTPRINT = Footprint(cell_m=CELL, robot_radius_m=CELL / 2)
 CONFIG = MissionConfig(FOOTPRINT)
 VALUES = {".": 0, "#": 100}
 TICK_S = 0.1
+IDLE = OrderState.idle("no order yet")
 
 
 def with_policy(config, **changes):
@@ -150,16 +152,34 @@ class Drive:
         request, self.request = self.request, None
         return self.tell(answer(request))
 
-    def go(self, *events):
-        """Drive one cell of the path, by a legal step, and report the pose."""
-        if self.walk:
-            there = self.walk.pop(0)
-            lattice = self.mission.lattice
-            around = naive.neighbours(lattice.steps)[lattice.local(self.cell)]
-            assert lattice.local(there) in around.values(), f"{self.cell} -> {there}"
-            self.cell = there
-            self.driven.append(there)
-        return self.tell(pose_at(*self.cell), *events)
+    def go(self, *events, times=1):
+        """Drive so many cells of the path, by legal steps, and report each pose."""
+        for _ in range(times):
+            if self.walk:
+                there = self.walk.pop(0)
+                lattice = self.mission.lattice
+                around = naive.neighbours(lattice.steps)[lattice.local(self.cell)]
+                assert lattice.local(there) in around.values(), f"{self.cell} -> {there}"
+                self.cell = there
+                self.driven.append(there)
+            decision = self.tell(pose_at(*self.cell), *events)
+        return decision
+
+    def tick(self, *events, times=1):
+        """Answer the plan asked for, if there is one, and drive a cell; so many times."""
+        for _ in range(times):
+            if self.request is not None:
+                self.plan()
+            self.go(*events)
+
+    def restarted(self, *events):
+        """A robot in the same place whose mission continues from what this one keeps on disk."""
+        kept = self.mission.snapshot()
+        order = OrderState.from_json(kept.note)
+        again = Drive(self.cell, config=self.config, order_state=order)
+        again.mission.restore(kept, order)
+        again.tell(*events)
+        return again
 
     def finish(self, ticks=500):
         """Drive on until the mission is done."""
@@ -170,9 +190,7 @@ class Drive:
         for _ in range(ticks):
             if self.mission.state is until:
                 return
-            if self.request is not None:
-                self.plan()
-            self.go()
+            self.tick()
         raise AssertionError(f"{self.mission.state} after {ticks} ticks: {self.mission.reason}")
 
 
@@ -182,9 +200,24 @@ def rectangle(row0, col0, row1, col1):
     return [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
 
 
-def started(*rows, cell=(0, 0)):
+def cells(row0, col0, row1, col1):
+    """All cells from (row0, col0) up to and without (row1, col1)."""
+    return {(row, col) for row in range(row0, row1) for col in range(col0, col1)}
+
+
+def robot_in(*rows, cell=(0, 0), **members):
+    """A robot in a building, with further members of ``Drive``."""
+    return Drive(cell, MapReceived(building(*rows)), pose_at(*cell), **members)
+
+
+def idle(*rows, **members):
+    """A robot that waits for an order."""
+    return robot_in(*rows, order_state=IDLE, **members)
+
+
+def started(*rows, cell=(0, 0), **members):
     """A robot that drives by its first plan over a building."""
-    drive = Drive(cell, MapReceived(building(*rows)), pose_at(*cell))
+    drive = robot_in(*rows, cell=cell, **members)
     drive.plan()
     return drive
 

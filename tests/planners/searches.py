@@ -68,10 +68,6 @@ def take_apart(monkeypatch):
     monkeypatch.setattr(regions, "ONE_REGION", 100)
     monkeypatch.setattr(regions, "EDGE", 16)
     monkeypatch.setattr(current_walk, "EDGE", 16)
-    ask_often(monkeypatch)
-
-
-def ask_often(monkeypatch):
     monkeypatch.setattr(search, "PROPOSALS_AT_ONCE", 3_000)
 
 

@@ -69,8 +69,6 @@ def test_twin_counts_the_same_cost_in_a_single_column(forwards, cost):
 @pytest.mark.parametrize(
     ("step_s", "quarter_turn_s", "said"),
     [
-        (0.0, 0.0, "step_s: must be in [0.001, 3600] s, got 0.0"),
-        (-1.0, 0.0, "step_s: must be in [0.001, 3600] s, got -1.0"),
         (1e-4, 0.0, "step_s: must be in [0.001, 3600] s, got 0.0001"),
         (3601.0, 0.0, "step_s: must be in [0.001, 3600] s, got 3601.0"),
         (math.inf, 0.0, "step_s: must be in [0.001, 3600] s, got inf"),
@@ -90,7 +88,6 @@ def test_an_impossible_cost_is_refused(step_s, quarter_turn_s, said):
     ("cell_m", "speed_m_s", "said"),
     [
         (0.3, 0.0, "speed_m_s: must be in"),
-        (0.3, -0.2, "speed_m_s: must be in"),
         (0.3, math.nan, "speed_m_s: must be in"),
         (0.3, math.inf, "speed_m_s: must be in"),
         (0.0, 0.3, "cell_m: must be in"),

@@ -1,7 +1,5 @@
 """The curve of a robot with a turning radius: drivable, free, worth it; judged by its points."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

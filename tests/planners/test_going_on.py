@@ -1,7 +1,5 @@
 """FaSACO that goes on: ants on the living trail, as many as the change is large."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

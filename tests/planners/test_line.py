@@ -15,8 +15,10 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
+from fasaco_edge.kernels.floor.sweeps import BLOCK
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.line import DrivenLine, LineConfig, LineSearch, line_over
+from fasaco_edge.planners.line import DrivenLine, LineConfig, LineSearch, left_in_blocks
+from fasaco_edge.planners.path import FIRST_PIECE, common_beginning
 from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
@@ -40,6 +42,12 @@ def planned(request):
     return grid, floor, stands, walk
 
 
+def line_over(walk, stands, floor, config, *, is_end_fixed=False):
+    """The first line that a search finds."""
+    search = LineSearch(walk, stands, floor, config, is_end_fixed=is_end_fixed)
+    return next(search.best for _ in search.run() if search.best is not None)
+
+
 def clutter():
     """Return a room of 4 x 3 m with pillars of one pixel and a wall askew."""
     cells = np.zeros((62, 82), np.int8)
@@ -60,9 +68,9 @@ def seconds_and_left(grid, line: DrivenLine, price: float) -> float:
 @pytest.mark.parametrize("price", [60.0, 180.0])
 def test_a_polished_line_is_better_by_the_judge(planned, price):
     grid, floor, stands, walk = planned
-    plain = line_over(walk, stands, floor, LineConfig(price_s_m2=0.0), is_end_fixed=False)
+    plain = line_over(walk, stands, floor, LineConfig(price_s_m2=0.0))
     config = LineConfig(price_s_m2=price, patch_s=0.0)
-    line = line_over(walk, stands, floor, config, is_end_fixed=False)
+    line = line_over(walk, stands, floor, config)
     before, after = (seconds_and_left(grid, one, price) for one in (plain, line))
     assert after < 0.93 * before
     figures = judge_floor(grid, line.xy, ROBOT).figures
@@ -75,7 +83,7 @@ def test_a_polished_line_is_better_by_the_judge(planned, price):
 def test_the_same_work_gives_the_same_line(planned):
     _, floor, stands, walk = planned
     config = LineConfig(moves_m2=500)
-    lines = [line_over(walk, stands, floor, config, is_end_fixed=False) for _ in range(2)]
+    lines = [line_over(walk, stands, floor, config) for _ in range(2)]
     assert lines[0].xy.tobytes() == lines[1].xy.tobytes()
     # Patches come after the budget.
     assert lines[0].tried == lines[1].tried <= 600 * floor.reachable_m2
@@ -145,7 +153,7 @@ def test_a_line_keeps_its_clearance_from_most_of_what_it_passes(planned):
     for clearance_m in (0.0, 0.02):
         on = with_clearance(floor, clearance_m)
         config = LineConfig(moves_m2=1500)
-        lines.append(line_over(walk, stands, on, config, is_end_fixed=False))
+        lines.append(line_over(walk, stands, on, config))
         near.append((distances_m(grid, lines[-1]) < ROBOT.radius_m + 0.015).mean())
     assert near[1] < 0.4 * near[0]
     # What is left is a strip along walls, hardly wider than the clearance.
@@ -162,7 +170,7 @@ def test_clearance_is_given_up_for_the_floor_of_a_narrow_passage():
     problem = CoverageProblem.of(stands.lattice, stands.start_cell(floor))
     walk = NearOptimal().plan(problem, lambda s: s.work.perturbations >= 20, ignore).cells
     on = with_clearance(floor, 0.03)
-    line = line_over(walk, stands, on, LineConfig(), is_end_fixed=False)
+    line = line_over(walk, stands, on, LineConfig())
     assert line.xy[:, 0].max() > 2.7
     near = distances_m(grid, line) < ROBOT.radius_m + 0.03 - 0.005
     assert 0.0 < near.mean() < 0.3
@@ -170,7 +178,7 @@ def test_clearance_is_given_up_for_the_floor_of_a_narrow_passage():
 
 def test_a_walk_of_one_cell_sweeps_what_is_below_the_tool(planned):
     _, floor, stands, walk = planned
-    line = line_over(walk[:1], stands, floor, LineConfig(), is_end_fixed=False)
+    line = line_over(walk[:1], stands, floor, LineConfig())
     assert len(line.xy) == 1
     assert 0.0 < line.swept_m2 <= math.pi * 0.15**2 * 1.05
 
@@ -183,3 +191,29 @@ def test_a_line_is_polished_on_pixels_as_fine_as_the_judge_s(resolution):
     floor = Floor.around(grid, RobotDiscs(0.18, 0.3), (middle, middle))
     judged = judge_floor(grid, np.array([(middle, middle)]), ROBOT)
     assert floor.geometry.resolution == judged.figures.pixel_m
+
+
+@pytest.mark.parametrize("at", [0, 1, FIRST_PIECE - 1, FIRST_PIECE, 5 * FIRST_PIECE, 1999, 2000])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_common_beginning_ends_where_walks_part(at, axis):
+    walk = np.arange(4000, dtype=np.int32).reshape(2000, 2)
+    other = np.concatenate([walk, walk[:10]])
+    if at < 2000:
+        other[at, axis] += 1
+    assert common_beginning(walk, other) == common_beginning(other, walk) == at
+
+
+def test_an_empty_walk_has_no_common_beginning():
+    assert common_beginning(np.empty((0, 2), np.int32), np.ones((3, 2), np.int32)) == 0
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (8, 8), (9, 17), (300, 1003), (2000, 40)])
+def test_unswept_pixels_are_counted_by_block(shape):
+    counts = np.random.default_rng(2).integers(0, 3, shape).astype(np.int16)
+    left, side = left_in_blocks(counts), 1 << BLOCK
+    assert left.dtype == np.int32
+    for (i, j), found in np.ndenumerate(left):
+        block = counts[i * side : (i + 1) * side, j * side : (j + 1) * side]
+        assert block.size
+        assert found == np.count_nonzero(block == 0)
+    assert left.sum() == np.count_nonzero(counts == 0)

@@ -1,7 +1,5 @@
 """The living trail against its rules written out cell by cell."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

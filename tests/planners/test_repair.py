@@ -16,11 +16,7 @@ from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.search.effort import repair_for
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.planners.search.repair import (
-    MOST_PERTURBATIONS,
-    PERTURBATIONS_AT_ONCE,
-    repaired,
-)
+from fasaco_edge.planners.search.repair import MOST_PERTURBATIONS, PERTURBATIONS_AT_ONCE, repaired
 from fasaco_edge.planners.walk_before import HELD_CELLS, completed
 from tests.benchmarks.judge import check_walk
 from tests.support.examples import examples
@@ -58,6 +54,13 @@ def driven_halfway(seed, change, end=None, cost=None):
     return CoverageProblem.of(lattice, here, covered=covered, end=end, cost=cost, before=rest)
 
 
+def completed_cells(problem, before, held=0):
+    """Return the cells of a completed walk, int32 (n, 2)."""
+    framed = FramedGround.of(problem)
+    flat = framed.unframed(completed(problem, framed, before, held))
+    return np.column_stack(np.divmod(flat, framed.cols)).astype(np.int32)
+
+
 def judge(problem, cells):
     """Check a walk by code that shares nothing with the planners."""
     verdict = check_walk(problem.lattice.steps, problem.to_cover, cells, problem.start, problem.end)
@@ -75,9 +78,7 @@ def judge(problem, cells):
 )
 def test_a_completed_walk_is_legal_and_complete(seed, change, home, held):
     problem = driven_halfway(seed, change, end=home)
-    framed = FramedGround.of(problem)
-    flat = framed.unframed(completed(problem, framed, problem.before, held))
-    judge(problem, np.column_stack(np.divmod(flat, framed.cols)))
+    judge(problem, completed_cells(problem, problem.before, held))
 
 
 @examples(50)
@@ -85,9 +86,7 @@ def test_a_completed_walk_is_legal_and_complete(seed, change, home, held):
 def test_without_a_change_the_walk_stays(seed):
     problem = driven_halfway(seed, change=0.0)
     assume(not problem.to_cover[problem.start])  # else the whole walk was driven
-    framed = FramedGround.of(problem)
-    flat = framed.unframed(completed(problem, framed, problem.before))
-    kept = np.column_stack(np.divmod(flat, framed.cols))
+    kept = completed_cells(problem, problem.before)
     assert np.array_equal(kept, problem.before[: len(kept)])
 
 
@@ -98,11 +97,9 @@ def test_cells_that_can_wait_leave_the_next_steps_alone():
     there, back = [(0, col) for col in range(12)], [(2, col) for col in range(11, -1, -1)]
     walk = np.array([*there, (1, 11), *back], np.int32)
     problem = CoverageProblem.of(CoverageLattice.from_free(np.ones((3, 12), bool)), (0, 0))
-    framed = FramedGround.of(problem)
     for later, kept in ((True, 12), (False, 1)):
         before = walk if later else walk[:12]
-        flat = framed.unframed(completed(problem, framed, before, held=12))
-        cells = np.column_stack(np.divmod(flat, framed.cols))
+        cells = completed_cells(problem, before, 12)
         judge(problem, cells)
         same = (cells[: len(before)] == before).all(axis=1)
         assert int(np.argmin(same)) >= kept
@@ -118,9 +115,7 @@ def test_cells_that_can_wait_leave_the_next_steps_alone():
 )
 def test_a_repaired_walk_costs_no_more_than_the_completed_one(seed, change, home, cost):
     problem = driven_halfway(seed, change, end=home, cost=cost)
-    framed = FramedGround.of(problem)
-    flat = framed.unframed(completed(problem, framed, problem.before, HELD_CELLS))
-    only_completed = np.column_stack(np.divmod(flat, framed.cols)).astype(np.int32)
+    only_completed = completed_cells(problem, problem.before, HELD_CELLS)
     path = repaired(problem, "fasaco", ColonyConfig(), never)
     verdict = judge(problem, path.cells)
     assert path.cost_s == cost.of_walk(path.cells)
@@ -135,8 +130,7 @@ def test_a_repair_is_worth_its_while():
     gains = []
     for seed in range(30):
         problem = driven_halfway(seed, change=0.05)
-        framed = FramedGround.of(problem)
-        gains.append(len(completed(problem, framed, problem.before)) - 1)
+        gains.append(len(completed_cells(problem, problem.before)) - 1)
         gains[-1] -= repaired(problem, "fasaco", ColonyConfig(), never).steps
     assert np.mean(gains) > 5
 
@@ -206,8 +200,7 @@ def test_many_changes_on_a_large_ground_are_all_repaired():
     changed = free & (rng.random(free.shape) >= 0.02)
     changed[0, 0] = True
     problem = CoverageProblem.of(CoverageLattice.from_free(changed), (0, 0), before=walk)
-    framed = FramedGround.of(problem)
-    only_completed = len(completed(problem, framed, walk)) - 1
+    only_completed = len(completed_cells(problem, walk)) - 1
     path = repaired(problem, "fasaco", ColonyConfig(), never)
     judge(problem, path.cells)
     assert path.work.proposals > 2 * repair_for(problem.cost).proposals

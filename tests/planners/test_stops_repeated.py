@@ -1,5 +1,7 @@
 """A plan that was stopped at any time is repeated by where that was, cell by cell."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,14 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.paper.fasaco import Fasaco
-from fasaco_edge.planners.planner import StopAt, StopRecorder, WorkLimit, never
+from fasaco_edge.planners.planner import (
+    SearchProgress,
+    StopAt,
+    StopRecorder,
+    TimeBudget,
+    WorkLimit,
+    never,
+)
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import (
     SHORT_SEARCH,
@@ -84,3 +93,27 @@ def test_the_search_after_a_poor_repair_is_short():
     most = SHORT_SEARCH + SHORT_SEARCH_PER_CELL * other.cells
     assert most <= path.work.proposals < most + 2 * PROPOSALS_AT_ONCE
     assert not is_poor(other, path)
+
+
+# When searches end: by the clock or their work.
+
+
+def test_a_budget_is_used_up_with_time():
+    progress = SearchProgress(SearchWork(), 100.0, 100)
+    assert not TimeBudget(60.0)(progress)
+    assert TimeBudget(60.0, started=time.monotonic() - 60.0)(progress)
+
+
+@pytest.mark.parametrize(
+    ("done", "reached"),
+    [
+        ((4, 7, 90), False),
+        ((5, 6, 90), False),
+        ((5, 7, 89), False),
+        ((5, 7, 90), True),
+        ((6, 8, 91), True),
+    ],
+)
+def test_a_work_limit_is_reached_once_every_count_is(done, reached):
+    limit = WorkLimit(SearchWork(ants=5, perturbations=7, proposals=90))
+    assert limit(SearchProgress(SearchWork(*done), 1.0, 1)) is reached

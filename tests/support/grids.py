@@ -152,6 +152,14 @@ def cropped(grid, row0, col0, row1, col1):
     return OccupancyGrid(part, grid.cells[row0:row1, col0:col1].copy())
 
 
+def seen_around(grid, at, reach_m):
+    """The same map, of which only what is near a point is known."""
+    col, row = grid.geometry.to_pixels(*at)
+    rows, cols = np.indices(grid.cells.shape) + 0.5
+    near = np.hypot(rows - row, cols - col) * grid.geometry.resolution < reach_m
+    return OccupancyGrid(grid.geometry, np.where(near, grid.cells, -1).astype(np.int8))
+
+
 def on_raster(geometry):
     """A grid moved onto its raster, by less than the rounding of float32."""
     raster, window = geometry.on_raster()

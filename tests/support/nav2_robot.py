@@ -212,8 +212,7 @@ class Nav2Robot:
         sec, nanosec = divmod(time.time_ns(), 1_000_000_000)
         message = types[POSE_TYPE](
             header=types["std_msgs/msg/Header"](
-                stamp=types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec),
-                frame_id="map",
+                stamp=types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec), frame_id="map"
             ),
             pose=types["geometry_msgs/msg/Pose"](
                 position=types["geometry_msgs/msg/Point"](x=self.x, y=self.y, z=0.0),

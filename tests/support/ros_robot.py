@@ -64,11 +64,7 @@ class RosPublisher:
         cache = ext.CacheConfig(max_samples=1 if attached else 10) if latched else None
         beats = ext.MissDetectionConfig(sporadic_heartbeat=0.5) if latched and attached else None
         self._publisher: Any = ext.declare_advanced_publisher(
-            session,
-            key,
-            cache=cache,
-            publisher_detection=latched,
-            sample_miss_detection=beats,
+            session, key, cache=cache, publisher_detection=latched, sample_miss_detection=beats
         )
 
     def put(self, payload: bytes) -> None:

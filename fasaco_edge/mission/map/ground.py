@@ -142,10 +142,7 @@ class MissionGround:
         if sweeping is None:
             return None
         discs = RobotDiscs(
-            footprint.robot_radius_m,
-            sweeping.tool_m,
-            footprint.free_at_most,
-            sweeping.clearance_m,
+            footprint.robot_radius_m, sweeping.tool_m, footprint.free_at_most, sweeping.clearance_m
         )
         return FloorMap(grid, plain, footprint, discs, sweeping.most_pixels, keep_out)
 

@@ -245,10 +245,7 @@ class Fasaco:
     name: str = "fasaco"
 
     def plan(
-        self,
-        problem: CoverageProblem,
-        stop: StoppingCriterion = never,
-        observe: Observer = ignore,
+        self, problem: CoverageProblem, stop: StoppingCriterion = never, observe: Observer = ignore
     ) -> CoveragePath:
         """Return the cheapest walk of the colony; see ``CoveragePlanner.plan``."""
         began, first_walk_s, walked, first_us = time.perf_counter(), 0.0, 0, 0

@@ -55,10 +55,7 @@ class NearOptimal:
     name: str = "colony-search"
 
     def plan(
-        self,
-        problem: CoverageProblem,
-        stop: StoppingCriterion = never,
-        observe: Observer = ignore,
+        self, problem: CoverageProblem, stop: StoppingCriterion = never, observe: Observer = ignore
     ) -> CoveragePath:
         """Return the cheapest walk found; see ``CoveragePlanner.plan``.
 

@@ -13,13 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.local_search.regions import (
-    RegionBox,
-    neighbourhood,
-)
-from fasaco_edge.kernels.local_search.walk_array import (
-    FRAME,
-)
+from fasaco_edge.kernels.local_search.regions import RegionBox, neighbourhood
+from fasaco_edge.kernels.local_search.walk_array import FRAME
 from fasaco_edge.planners.problem import FramedGround
 from fasaco_edge.planners.search.search_trail import SearchTrail
 from fasaco_edge.planners.search.walk_region import WalkRegion

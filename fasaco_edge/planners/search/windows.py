@@ -30,10 +30,7 @@ from fasaco_edge.kernels.windows.memory import (
 from fasaco_edge.kernels.windows.passages import BEGIN, NONE, SLOTS, Passages, passages_of, walk_of
 from fasaco_edge.kernels.windows.program import advance_window, begin_window, end_window
 from fasaco_edge.kernels.windows.search import ANY_PRICE, BEST, COST, SOLVED, Seams, solve_windows
-from fasaco_edge.kernels.windows.window import (
-    WalkWindow,
-    WindowSizes,
-)
+from fasaco_edge.kernels.windows.window import WalkWindow, WindowSizes
 from fasaco_edge.planners.bound import LowerBound
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
@@ -156,12 +153,7 @@ class WindowSearch:
         Then join the rings of the solution; keep the result if it is better. ``mirrored`` is the
         first corner, as in ``kernels.windows.window``.
         """
-        framed, ground, passages, terms = (
-            self._framed,
-            self._ground,
-            self._passages,
-            self._terms,
-        )
+        framed, ground, passages, terms = (self._framed, self._ground, self._passages, self._terms)
         window = WalkWindow(FRAME, FRAME, framed.rows, framed.cols, framed.width, mirrored)
         program = _program(self._size, beam, self._aim.cells.size)
         price = RING_TURNS * terms.turn
