@@ -245,5 +245,4 @@ def _is_newer(mark: int, last: int | None) -> bool:
 
 
 def _leaves_gap(name: str, mark: int, last: int | None) -> bool:
-    """Return whether samples between the last sample and this one are missing."""
     return last is not None and not name.endswith("/uhlc") and _is_newer(mark, last + 1)

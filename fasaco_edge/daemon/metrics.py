@@ -225,7 +225,6 @@ class MetricsServer:
         server.close()
 
     async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Answer one request."""
         self._open.append(writer)
         if len(self._open) > MOST_OPEN:
             self._open.pop(0).transport.abort()

@@ -221,7 +221,6 @@ class Replay:
     def _read_commands(
         self, arrivals: Sequence[Arrival]
     ) -> tuple[list[CommandReceived], list[FasacoError]]:
-        """Return the commands that the daemon took, and the errors of malformed commands."""
         commands, refused = list[CommandReceived](), list[FasacoError]()
         for arrival in arrivals:
             if arrival.topic != COMMAND.name:

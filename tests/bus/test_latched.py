@@ -44,8 +44,6 @@ def publishing(endpoint, numbered=True, cache=1):
 
 
 class Spy:
-    """Counts what publishers of the key are asked."""
-
     def __init__(self, session):
         self._asked, self._lock = [], threading.Lock()
         callback = zenoh.handlers.Callback(self._take, indirect=False)

@@ -42,7 +42,6 @@ def ended_well(shell: Terminal, code: int = 0) -> str:
 
 @pytest.fixture
 def recording(tmp_path):
-    """A recorded mission."""
     pytest.importorskip("rerun")
     path = tmp_path / "mission.rrd"
     path.write_bytes(lzma.decompress(RECORDING.read_bytes()))

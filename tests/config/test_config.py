@@ -25,8 +25,6 @@ from tests.support.examples import examples
 
 @pytest.fixture
 def load(tmp_path: Path) -> Any:
-    """Load a configuration from its text."""
-
     def write_and_load(text: str) -> DaemonConfig:
         file = tmp_path / "config.yaml"
         file.write_text(text)

@@ -61,11 +61,9 @@ class Arrivals:
         self.mailbox.post(kind, Received(kind, sample, self.clock))
 
     def events(self):
-        """Return the events, and the faults."""
         return self.inbox.decode(take_batch(self.mailbox, 0.0))
 
     def decode(self):
-        """Return the types of the events, and the faults."""
         events, faults = self.events()
         return [type(event) for event in events], faults
 

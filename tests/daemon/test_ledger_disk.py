@@ -17,7 +17,6 @@ small_disk = disk_fixture("256k")
 
 
 def fill(ballast: Path) -> None:
-    """Fill the disk to the last byte."""
     with ballast.open("wb", buffering=0) as file:
         try:
             while file.write(bytes(4096)):

@@ -55,7 +55,6 @@ def pixels():
 
 @pytest.fixture(scope="module")
 def path(daemon, pixels):
-    """The path of the room with the pillar."""
     with Outsider(daemon.endpoint) as outsider:
         receiver = outsider.listen("path")
         outsider.put("map", map_bytes(pixels, stamp_ns=12_000_000_034))

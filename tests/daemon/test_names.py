@@ -31,8 +31,6 @@ ROOM = room(4.0, 3.0)
 
 
 class Robot:
-    """A mapper, and subscriptions, beside the router."""
-
     def __init__(self, endpoint):
         config = {
             "mode": "client",
@@ -53,7 +51,6 @@ class Robot:
         self.session.put(f"{PREFIX}/pose", pose_bytes(0.75, 0.75))
 
     def claims(self):
-        """The daemons there are, by id."""
         replies = self.session.liveliness().get(f"{PREFIX}/claim/*/*", timeout=2.0)
         return claims_in(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
 

@@ -66,7 +66,6 @@ def wait_replaced(outsider: Outsider, config: Callable[[dict], bool]) -> None:
 
 
 def reload(running, outsider, square):
-    """Read another keep-out zone from the file."""
     west, south, east, north = square
     corners = [[west, south], [east, south], [east, north], [west, north]]
     rewritten(running, mission={"keep_out": [corners]})
@@ -74,7 +73,6 @@ def reload(running, outsider, square):
 
 
 def send_mask(running, outsider, square):
-    """Publish another keep-out mask."""
     before = outsider.ask_status()["config"]["mission"]["keep_out_mask"]
     put_mask(outsider, fill(BLANK, *square, WALL))
     wait_replaced(outsider, lambda mission: mission["keep_out_mask"] not in ("", before))

@@ -85,7 +85,6 @@ class _Heard:
         return took
 
     def _note(self, token):
-        """Note whether the daemon is there now."""
         self.tokens.append(token.kind == zenoh.SampleKind.PUT)
 
     def _is_new(self, name, since):

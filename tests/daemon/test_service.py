@@ -23,7 +23,6 @@ WATCHDOG_S = 1.0
 
 @contextmanager
 def service(folder: Path, *, env=None, **sections) -> Iterator[tuple[Daemon, Manager]]:
-    """A daemon with a service manager, once it is ready."""
     manager = Manager(folder)
     told = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": str(int(1e6 * WATCHDOG_S))}
     try:
@@ -62,7 +61,6 @@ def test_the_watchdog_is_fed_until_the_process_stands_still(tmp_path):
 
 
 def rewritten(running: Daemon, **sections) -> None:
-    """Change some sections of its configuration, and tell it."""
     (file,) = running.log.parent.glob("daemon0.yaml")
     before = yaml.safe_load(file.read_text())
     after = {**before, **{k: before.get(k, {}) | v for k, v in sections.items()}}

@@ -45,7 +45,6 @@ class Battery:
         self.outsider.put("battery", payload, BATTERY_STATE)
 
     def on(self):
-        """Publish."""
         return meanwhile(self.publish, PERIOD_S)
 
 

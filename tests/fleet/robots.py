@@ -34,7 +34,6 @@ class FleetRobot:
         self.seat.put("map", map_bytes(self.floor))
 
     def go(self) -> None:
-        """Drive to the next centre of a cell, and report the pose."""
         if len(self._path.heard) > self._seen:
             self._seen = len(self._path.heard)
             message = oracle.from_bytes("nav_msgs/msg/Path", self._path.heard[-1].payload)

@@ -54,13 +54,10 @@ class Teller:
         self.send("fleet", encode_json(member(**members)))
 
     def stand(self, x: float, y: float) -> None:
-        """Send a pose."""
         self.send("pose", pose_bytes(x, y))
 
     def show(self, pixels: Pixels) -> None:
-        """Send a map."""
         self.send("map", map_bytes(pixels))
 
     def send(self, topic: str, payload: bytes) -> None:
-        """Send any bytes on a topic."""
         self._publishers[topic].put(payload)

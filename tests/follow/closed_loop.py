@@ -59,7 +59,6 @@ class ClosedLoop:
         self._due = 0.0
 
     def send(self, xy, yaw=None):
-        """Publish a path."""
         self.follower.take_path(path_message(xy, yaw))
 
     @property
@@ -69,7 +68,6 @@ class ClosedLoop:
         return points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9)]
 
     def wait(self, seconds):
-        """Let some time pass."""
         until = self.now + seconds
         self.run(lambda: self.now > until)
 

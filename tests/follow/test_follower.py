@@ -27,7 +27,6 @@ class Told:
         assert self.follower.state is FollowerState.DRIVING
 
     def begin_anew(self, xy, limits=LIMITS):
-        """Start the follower again, at 0, 0."""
         self.x = 0.0
         self.follower = Follower(limits)
         self.follower.take_planner("a1")

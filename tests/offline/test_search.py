@@ -61,7 +61,6 @@ def planned(grid: OccupancyGrid, seed: int, pauses: Pauses, observe=ignore, line
 
 
 def cost_s(ground: PlanGround, xy: np.ndarray) -> float:
-    """Return what is minimised, counted anew."""
     floor, config = ground.floor, LINES["thorough"]
     assert floor is not None
     unit_m, sweeps = floor.geometry.resolution, _sweeps(floor)

@@ -56,7 +56,6 @@ class Desk:
         self.inputs = InputLog(self.writer, BEGAN_NS)
 
     def hear(self, topic: str, payload: bytes, attachment: bytes = b"", after_s: float = 0.1):
-        """Let a sample come."""
         self.now_ns += round(after_s * SECOND_NS)
         sample = Sample(f"robot/{topic}", payload, "some/msg/Type", attachment)
         arrival = Arrival(topic, sample, self.now_ns, BEGAN_NS + self.now_ns)

@@ -24,15 +24,12 @@ from tests.support.waiting import until
 
 @dataclass
 class Served:
-    """A running server of a page."""
-
     process: subprocess.Popen[bytes]
     address: str
     log: Path
 
     @property
     def url(self) -> str:
-        """Of the page."""
         return f"http://{self.address}/"
 
     def descriptors(self) -> int:
@@ -51,7 +48,6 @@ class Served:
 
 
 def served(folder: Path, endpoint: str, *words: str) -> AbstractContextManager[Served]:
-    """Serve the page of a daemon's robot."""
     return serving(folder, "--connect", endpoint, *words)
 
 
@@ -76,7 +72,6 @@ def serving(folder: Path, *words: str) -> Iterator[Served]:
 
 
 def listens(page: Served) -> bool:
-    """Tell whether a page is served."""
     assert page.process.poll() is None, page.log.read_text()
     try:
         return page.get()[0] == 200
@@ -97,11 +92,9 @@ class Looker:
     asked: int = 0
 
     def send(self, **message: Any) -> None:
-        """Send a message."""
         self.socket.send(json.dumps(message))
 
     def read(self) -> dict[str, Any]:
-        """Return the next message."""
         data = self.socket.recv(TIMEOUT_S)
         if isinstance(data, str):
             message = json.loads(data)

@@ -59,14 +59,11 @@ COVERED = """(() => {
 
 @dataclass
 class Tab:
-    """A tab of the browser."""
-
     socket: ClientConnection
     complaints: list[str] = field(default_factory=list)
     numbers: Iterator[int] = field(default_factory=itertools.count)
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
-        """Call a method of the DevTools protocol."""
         number = next(self.numbers)
         self.socket.send(json.dumps({"id": number, "method": method, "params": params}))
         while True:
@@ -81,7 +78,6 @@ class Tab:
                 return result
 
     def js(self, text: str) -> Any:
-        """Return the value of an expression."""
         return self.call("Runtime.evaluate", expression=text)["result"].get("value")
 
     def click(self, name: str) -> None:
@@ -103,7 +99,6 @@ class Tab:
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
 
     def touch(self, *way: tuple[float, float]) -> None:
-        """Draw a finger over the screen."""
         for index, (x, y) in enumerate(way):
             kind = "touchMove" if index else "touchStart"
             self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y}])
@@ -152,17 +147,14 @@ def pages_at(listed: str) -> list[dict[str, Any]]:
 
 
 def has(picture: np.ndarray, colour: str) -> int:
-    """Return how many pixels have a colour."""
     return int((picture == channels(colour)).all(axis=-1).sum())
 
 
 def channels(colour: str) -> list[int]:
-    """Return red, green and blue of a colour of the style."""
     return [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
 
 
 def pause_and_reload(tab: Tab, outsider: Outsider, url: str) -> None:
-    """Pause the mission, and open its page anew."""
     tab.click("pause")
     outsider.wait_status(lambda status: status["state"] == "paused")
     tab.call("Page.navigate", url=url)

@@ -24,7 +24,6 @@ TECHNICAL = re.compile(
 
 
 def status(**members: object) -> Status:
-    """Return a status with these members."""
     return decode_tolerant(encode_json(FULL | members), Status)
 
 

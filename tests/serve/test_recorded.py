@@ -97,14 +97,12 @@ def told(folder: Path, **options: Any) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of such a run."""
     (one,) = told(tmp_path_factory.mktemp("one") / "runs")
     return one
 
 
 @pytest.fixture(scope="module")
 def timeline(file: Path) -> Iterator[Timeline]:
-    """The recording, opened."""
     with open_timeline([file]) as opened:
         yield opened
 
@@ -123,7 +121,6 @@ def at(looker: Looker, at_s: float) -> dict[str, Any]:
 
 
 def points(message: dict[str, Any]) -> np.ndarray:
-    """Return the points of a path."""
     xy = np.frombuffer(message["body"], "<f4").reshape(-1, 2)
     return xy + np.array([message["x"], message["y"]])
 

@@ -72,7 +72,6 @@ def covering(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 
 @pytest.fixture(scope="module")
 def page(covering: Daemon, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """Its page, to look only."""
     with served(tmp_path_factory.mktemp("page"), covering.endpoint) as running:
         yield running
 
@@ -395,7 +394,6 @@ def test_a_hanging_viewer_is_dropped_and_blocks_no_other(tmp_path):
 
 
 def is_of(pixels: np.ndarray) -> Callable[[Any], bool]:
-    """Return what tells whether a message shows this map."""
     marks = np.where(pixels == 100, 2, np.where(pixels == 0, 1, 0)).astype(np.uint8)
     return lambda message: message["body"] == marks.tobytes()
 
@@ -466,7 +464,6 @@ class SilentBrowser:
         self.heard: list[str] = []
 
     async def send(self, message: str) -> None:
-        """Take a message in."""
         self.heard.append(json.loads(message)["kind"])
 
     async def __aiter__(self) -> AsyncIterator[str]:

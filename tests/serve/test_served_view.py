@@ -23,7 +23,6 @@ CORNERS = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
 
 
 def tell(view: ServedView, topic: str, document: Any, now: float, key: str = "") -> None:
-    """Let a document come."""
     view.take(topic, Sample(key, encode_json(document)), now)
 
 

@@ -41,12 +41,10 @@ def console(width: int = 80, *, colours: str | None = "truecolor") -> Console:
 
 
 def plain(line: str) -> str:
-    """Return what is seen of a line."""
     return ESCAPE.sub("", line)
 
 
 def tell(view: RobotView, topic: str, payload: bytes, attachment: bytes = b"") -> None:
-    """Let a sample come."""
     schema = POSE_STAMPED if topic == "pose" else ""
     view.take(topic, Sample(topic, payload, schema, attachment), NOW)
 

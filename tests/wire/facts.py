@@ -27,7 +27,6 @@ def placed(geometry: GridGeometry) -> dict[str, Any]:
 
 
 def facts_of(message: Any) -> dict[str, Any]:
-    """Return what an index says of a message."""
     if isinstance(message, tuple):
         poses = [transform.planar() for transform in message]
         return {
@@ -74,7 +73,6 @@ def check_facts(said: dict[str, Any], facts: dict[str, Any]) -> None:
 
 
 def _flat(value: Any) -> list[Any]:
-    """Return the leaves of nested lists, in order."""
     if not isinstance(value, list):
         return [value]
     return [leaf for item in value for leaf in _flat(item)]

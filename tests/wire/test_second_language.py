@@ -58,7 +58,6 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read(client: Path, messages: Sequence[tuple[str, bytes]]) -> list[dict[str, Any]]:
-    """Return what the client says of each message."""
     sent = b"".join(f"{kind} {len(payload)}\n".encode() + payload for kind, payload in messages)
     ended = subprocess.run([str(client)], input=sent, capture_output=True, check=False)
     assert (ended.returncode, ended.stderr) == (0, b"")

@@ -116,7 +116,6 @@ class FleetLayer(Company):
         return joint, open_cells(joint.lattice.window) & joint.reachable
 
     def _joint(self, area: ReachableArea) -> ReachableArea:
-        """Return the joint area as of the last check."""
         if self._seen is None or self._seen[0] is not area:
             self._seen = area, self.others.ground.joint(area)
         return self._seen[1]
@@ -259,7 +258,6 @@ class FleetLayer(Company):
         return "others have swept cells of this robot's part"
 
     def _count_taken(self) -> int:
-        """Return the number of this robot's cells that only others have swept."""
         self._counted = self._ledger.shared.version
         area = self._map.area
         if area is None:

@@ -59,8 +59,6 @@ STATES = {
 
 @dataclass(slots=True)
 class _RobotDrawings:
-    """Drawings of a robot."""
-
     state: str = ""
     known: Bounds | None = None
     track: list[tuple[float, float]] = field(default_factory=list)

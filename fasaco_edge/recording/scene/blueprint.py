@@ -102,7 +102,6 @@ def plot_view(plot: Plot, contents: Sequence[str]) -> rrb.TimeSeriesView:
 
 
 def _curves_view(plot: Plot) -> rrb.TimeSeriesView:
-    """Return the view of a plot, with its curves."""
     return plot_view(plot, [f"/{curve.entity}" for curve in CURVES if curve.plot is plot])
 
 

@@ -20,7 +20,6 @@ FLEET = ("r1", "r10", "map")
 
 @pytest.fixture(scope="module")
 def router():
-    """A router, on loopback."""
     endpoint = free_endpoint()
     with open_bus(BusSettings("router", (), (endpoint,))):
         yield endpoint
@@ -39,7 +38,6 @@ def fleet(router, tmp_path_factory):
 
 @pytest.fixture
 def seats(router, fleet):
-    """An outsider at each robot's keys."""
     with contextlib.ExitStack() as stack:
         yield {name: stack.enter_context(Outsider(router, name)) for name in FLEET}
 

@@ -163,8 +163,6 @@ def test_a_robot_that_does_not_fit_is_left_out_with_the_reason(frame, members, m
 
 
 class Listener:
-    """Keeps what is published."""
-
     def __init__(self):
         self.payloads, self.heard = [], []
 

@@ -42,7 +42,6 @@ def divided_by(member, number):
 
 
 def in_room():
-    """A robot, r1, in a room."""
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
     robot.mission.covered.shared.begin_epoch(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
@@ -114,7 +113,6 @@ def test_a_robot_leaves_the_rest_of_a_line_without_open_floor():
 
 
 def nearest_to(line, place):
-    """Return the least distance of a line to a place."""
     points = [a + (b - a) * share for a, b in pairwise(np.array(line)) for share in SHARES]
     return min(math.dist(point, place) for point in points)
 

@@ -191,7 +191,6 @@ def test_ground_far_away_of_a_robot_that_lies_takes_no_memory():
 
 
 def divided(robots, seeds, handicaps_s=(0.0, 0.0, 0.0)):
-    """Return the division of robots by their seeds."""
     parts = zip(robots, seeds, handicaps_s, strict=False)
     return Division.of(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in parts)
 

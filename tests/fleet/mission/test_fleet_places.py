@@ -110,8 +110,6 @@ def test_cells_from_before_a_correction_of_the_own_map_are_void(place):
 
 
 class Listener:
-    """Keeps what a robot tells."""
-
     def put(self, payload):
         self.payload = payload
 

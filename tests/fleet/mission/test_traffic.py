@@ -97,7 +97,6 @@ def test_the_other_one_drives_at_its_own_pace():
 
 
 def at(cell):
-    """The middle of a cell."""
     return (cell[1] + 0.5) * 0.25, (cell[0] + 0.5) * 0.25
 
 

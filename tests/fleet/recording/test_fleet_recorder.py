@@ -43,7 +43,6 @@ class Studio:
         self.bus, self.recorder, self.out = bus, recorder, out
 
     def pass_time(self, seconds):
-        """Let the recorder work."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             self.recorder.step(0.02)
@@ -56,11 +55,9 @@ class Studio:
             self.recorder.step(0.02)
 
     def joined(self, *names):
-        """Tell whether robots are recorded."""
         return {member.name for member in self.recorder._members} >= set(names)
 
     def shows(self, name):
-        """Tell whether a robot's map is drawn."""
         return self.recorder._scene._drawn[name].known is not None
 
     def parts(self):
@@ -85,7 +82,6 @@ def studio(tmp_path):
 
 
 def log_of(part):
-    """Return the lines of the log."""
     return [str(line[0]) for line in read_column(part, entities.FLEET_LOG, TEXT).values]
 
 

@@ -47,7 +47,6 @@ def noted(robot, way, begin_s, *, waits=(), scale=1.0):
 
 
 def lane(row, first, last):
-    """Return the cells of a row, from one column to another."""
     step = 1 if last >= first else -1
     return [(row, col) for col in range(first, last + step, step)]
 

@@ -18,7 +18,6 @@ AHEAD = ((1.3, 1.0), (1.6, 1.0), (1.6, 2.5))
 
 
 def tell(view: FleetView, robot: str, topic: str, payload: bytes, now: float = NOW) -> None:
-    """Let a sample come."""
     sample = Sample(f"fasaco/@v1/{robot}/{topic}", payload)
     at_ns = int(1e9 * now)
     view.take(RobotSample(robot, Arrival(topic, sample, at_ns, at_ns)))

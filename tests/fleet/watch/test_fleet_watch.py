@@ -45,7 +45,6 @@ class Hall:
         self.silent: set[str] = set()
 
     def published(self) -> contextlib.AbstractContextManager[None]:
-        """Publish a message of each, again and again."""
         return meanwhile(self._publish, EVERY_S)
 
     def _publish(self) -> None:
@@ -56,7 +55,6 @@ class Hall:
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[tuple[Hall, str]]:
-    """Two robots of one fleet, one of another, and their endpoint."""
     endpoint = free_endpoint()
     with (
         open_bus(BusSettings("router", (), (endpoint,))) as bus,
