@@ -29,13 +29,7 @@ from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from tests.support.recordings import (
-    TEXT,
-    bus_on_free_port,
-    read_column,
-    read_summary,
-    writer_in,
-)
+from tests.support.recordings import TEXT, bus_on_free_port, read_column, read_summary, writer_in
 from tests.support.senders import Sender
 
 SECOND_NS = 1_000_000_000

@@ -43,14 +43,7 @@ from tests.support.recordings import (
     read_summary,
     recorder_process,
 )
-from tests.support.scripted_mission import (
-    CELL_M,
-    COLS,
-    RADIUS_M,
-    ROWS,
-    Mission,
-    building,
-)
+from tests.support.scripted_mission import CELL_M, COLS, RADIUS_M, ROWS, Mission, building
 from tests.support.senders import Sender
 from tests.wire.schemas import check
 

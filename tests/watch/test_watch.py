@@ -16,13 +16,7 @@ import pytest
 from fasaco_edge.host.processes import own_mb
 from fasaco_edge.watch.live import Screen
 from tests.support.outsider import Outsider
-from tests.support.processes import (
-    Daemon,
-    daemon_process,
-    fasaco_edge,
-    free_endpoint,
-    mapped_files,
-)
+from tests.support.processes import Daemon, daemon_process, fasaco_edge, free_endpoint, mapped_files
 from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes
 from tests.watch.terminal import Terminal, piped
 

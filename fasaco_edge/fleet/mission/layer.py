@@ -156,10 +156,7 @@ class FleetLayer(Company):
             self.numbers.follow(newer)
             self._division = Division.of(newer.parts)
         else:
-            robots = [
-                Robot(self._robot, cell, self.step_s),
-                *self.numbers.in_reach(joint, now),
-            ]
+            robots = [Robot(self._robot, cell, self.step_s), *self.numbers.in_reach(joint, now)]
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
             robots += self.numbers.unseen(before, joint.lattice, robots, self._divided_at, now)

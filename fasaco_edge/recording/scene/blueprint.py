@@ -70,11 +70,7 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin=f"/{entities.WORLD}",
         name="Pheromone that ants follow (bright: much), and the path of that time (white)",
-        contents=[
-            f"/{entities.PHEROMONE}/**",
-            f"/{entities.PATH}",
-            f"/{entities.ROBOT}/**",
-        ],
+        contents=[f"/{entities.PHEROMONE}/**", f"/{entities.PATH}", f"/{entities.ROBOT}/**"],
         eye_controls=eye_above(bounds, PHEROMONE_ASPECT),
         line_grid=False,
         background=PHEROMONE_BACKGROUND,

@@ -13,11 +13,7 @@ from hypothesis import strategies as st
 from fasaco_edge.errors import FleetError
 from fasaco_edge.fleet.mission.layer import MANY_TAKEN
 from fasaco_edge.fleet.mission.members import GONE_S
-from fasaco_edge.fleet.mission.shared import (
-    MOST_ROBOTS,
-    MOST_TILES,
-    SharedProgress,
-)
+from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, MOST_TILES, SharedProgress
 from fasaco_edge.fleet.mission.shared_work import MOST_AHEAD
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES, SweptQueue
 from fasaco_edge.grid.geometry import Pose2D, Window

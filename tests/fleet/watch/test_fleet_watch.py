@@ -19,12 +19,7 @@ from fasaco_edge.wire.keys import Keys
 from tests.fleet.told import Teller
 from tests.fleet.watch.fleets import AHEAD, PARTS
 from tests.support.outsider import Outsider
-from tests.support.processes import (
-    daemon_process,
-    fasaco_edge,
-    free_endpoint,
-    mapped_files,
-)
+from tests.support.processes import daemon_process, fasaco_edge, free_endpoint, mapped_files
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.waiting import meanwhile
 from tests.watch.terminal import Terminal, piped
