@@ -16,8 +16,7 @@ from fasaco_edge.config.config import DaemonConfig, MetricsConfig, MissionPolicy
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.security import BusConfig
 from fasaco_edge.doctor import computer, report, security, session
-from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level
-from fasaco_edge.doctor.unit import Unit, find_unit
+from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels import manifest
 from fasaco_edge.kernels.folder import wanted_folder
 from fasaco_edge.planners.stages import STAGES
