@@ -17,7 +17,6 @@ VASE = "0.9,0.9;2.1,0.9;2.1,2.1;0.9,2.1"
 
 @pytest.fixture
 def robot(tmp_path):
-    """A robot that has covered 12 cells."""
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         begin(outsider)
         drive(outsider, lanes(12))
@@ -33,7 +32,6 @@ def covered(outsider):
 
 
 def on_terminal(answer, *words):
-    """Run a command on a terminal, answer its question; return its code and what it wrote."""
     with Terminal(*words, columns=200) as shell:
         shell.wait_text("[y/N]")
         shell.type(answer)

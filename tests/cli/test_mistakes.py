@@ -28,7 +28,6 @@ MAP = "{image: map.png, resolution: 0.05, origin: [0, 0, 0], negate: 0}"
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with a good grid, a bad one, and a file that is none."""
     monkeypatch.chdir(tmp_path)
     np.save("good.npy", np.ones((6, 6), bool))
     blocked = np.ones((6, 6), bool)

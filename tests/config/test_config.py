@@ -319,7 +319,6 @@ NAMES = {
 
 @st.composite
 def documents(draw: st.DrawFn) -> object:
-    """Draw a document with few mistakes, or with nothing but mistakes."""
     sections = draw(st.lists(st.sampled_from(sorted(NAMES)), max_size=2, unique=True))
     document: dict[object, object] = {
         section: {key: draw(VALUES) for key in draw(st.sets(st.sampled_from(NAMES[section])))}

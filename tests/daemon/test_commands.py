@@ -25,7 +25,6 @@ KITCHEN_CELLS = {(row, col) for row in (3, 4) for col in range(1, 5)}
 def command(
     outsider: Outsider, name: str, order: dict[str, Any] | None = None, *, discard: bool = True
 ) -> dict[str, Any]:
-    """Give a command; return the answer, or the error."""
     asked: dict[str, Any] = {"command": name} | ({"order": order} if order is not None else {})
     if name in ("start", "reset"):
         asked["discard"] = discard
@@ -44,7 +43,6 @@ def ask(outsider: Outsider, payload: bytes | None) -> dict[str, Any]:
 
 
 def told(daemon: Daemon, *words: str) -> Any:
-    """Run ``fasaco-edge mission`` here; it has to succeed. Return its JSON."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = main(["mission", *words, "--connect", daemon.endpoint, "--json"])

@@ -18,7 +18,6 @@ CLIENT = PROTOCOL / "examples" / "client.py"
 
 
 def say(outsider, name, payload=None):
-    """Ask, and return the document that comes back, checked; None where CDR does."""
     (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/{name}", payload=payload, timeout=60.0)
     answer = reply.ok or reply.err
     if "application/cdr" in str(answer.encoding):

@@ -22,7 +22,6 @@ RECORDING = "recording"
 
 
 def plan_times(outsider, count, first_revision):
-    """Send maps that change something; return for each the seconds until its path came."""
     path = outsider.listen("path")
     outsider.put("pose", pose_bytes(0.75, 0.75))
     seconds = []
@@ -57,8 +56,6 @@ def test_a_frozen_subscriber_does_not_hold_the_planner(daemon, outsider):
 
 
 def wait_recorder(outsider, state, **more):
-    """Return the recorder's part of the first status that says ``state``."""
-
     def holds(status):
         said = status["recorder"] or {}
         return said.get("state") == state and all(said.get(k) == v for k, v in more.items())

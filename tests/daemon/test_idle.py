@@ -19,14 +19,12 @@ IDLE_MB = 32.0
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """One whose memory is its own."""
     with daemon_process(tmp_path_factory.mktemp("daemon"), executed=True) as running:
         yield running
 
 
 @pytest.fixture(scope="module")
 def waiting(daemon: Daemon) -> Daemon:
-    """A daemon that has said who it is, and has heard no map."""
     with Outsider(daemon.endpoint) as outsider:
         outsider.wait_status(lambda status: status["state"] == "waiting for map")
     return daemon
@@ -53,7 +51,6 @@ def test_it_is_small(waiting):
 
 
 def wakes(pid):
-    """How often its main thread has waited for something."""
     lines = Path(f"/proc/{pid}/task/{pid}/status").read_text().splitlines()
     (line,) = (line for line in lines if line.startswith("voluntary_ctxt_switches"))
     return int(line.split()[1])

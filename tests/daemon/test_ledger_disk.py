@@ -26,7 +26,6 @@ def fill(ballast: Path) -> None:
 
 
 def check_trouble(running: Daemon, outsider: Outsider, said: str) -> None:
-    """Drive on while nothing can be written; check what is said, and that nothing stands still."""
     drive(outsider, lanes(40)[20:])
     status = outsider.wait_status(lambda status: status["ledger"]["fault"] is not None)
     assert said in status["ledger"]["fault"]

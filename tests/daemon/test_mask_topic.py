@@ -37,13 +37,11 @@ def put_mask(outsider, pixels, **keys):
 
 
 def give(outsider):
-    """Give map and pose, without waiting for a path."""
     outsider.put("map", map_bytes(ROOM))
     outsider.put("pose", pose_bytes(*lanes(1)[0]))
 
 
 def cells_in(frame, heard):
-    """Return the cells of a path in a frame; none of one in another."""
     message = oracle.from_bytes("nav_msgs/msg/Path", heard.payload)
     places = [(stamped.pose.position.x, stamped.pose.position.y) for stamped in message.poses]
     return set(cells_of(np.array(places))) if message.header.frame_id == frame and places else set()
@@ -134,8 +132,6 @@ def test_a_mask_in_another_frame_waits_for_a_map_in_that_frame(tmp_path):
 
 
 class Mask:
-    """A mask that has come, and what is wrong with it."""
-
     def __init__(self, *faults):
         self.has_change = True
         self.faults = list(faults)

@@ -43,7 +43,6 @@ def about(heard):
 
 
 def covers(heard, pixels):
-    """Tell whether a path visits exactly the cells where the robot fits."""
     points, _ = planned(heard)
     return len(points) > 0 and set(cells_of(points)) == coverable_cells(pixels)
 
@@ -245,7 +244,6 @@ def test_the_status_comes_once_a_second(path, outsider):
 
 @pytest.fixture
 def fresh(tmp_path):
-    """An outsider of a daemon of its own."""
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
         yield client
 

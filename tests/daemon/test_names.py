@@ -55,8 +55,6 @@ class Robot:
         return claims_in(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
 
     def wait_claims(self, planning, waiting=0):
-        """Wait until so many daemons plan, and so many do not; return them."""
-
         def holds():
             claims = self.claims()
             plan = list(claims.values()).count(ClaimState.PLANS)
@@ -65,8 +63,6 @@ class Robot:
         return until(holds)
 
     def wait_path(self, since=0):
-        """Give map and pose until somebody answers with a path of some steps."""
-
         def holds():
             self.tell()
             time.sleep(0.2)
@@ -81,7 +77,6 @@ def attached(path):
 
 @contextmanager
 def two_daemons(folder, *endpoints, **sections):
-    """Two of one name, begun at the same moment, each with a state of its own."""
     with ExitStack() as stack:
         daemons = []
         for number, endpoint in enumerate(endpoints):

@@ -31,7 +31,6 @@ def get(outsider: Outsider, name: str, payload: bytes | None = None) -> list[zen
 
 
 def error(outsider: Outsider, name: str, payload: bytes | None = None) -> dict[str, Any]:
-    """Return the one answer, which has to be an error with its three members."""
     (reply,) = get(outsider, name, payload)
     assert reply.ok is None, reply.ok.payload.to_bytes()
     assert str(reply.err.encoding) == "application/json"
@@ -43,7 +42,6 @@ def error(outsider: Outsider, name: str, payload: bytes | None = None) -> dict[s
 
 @pytest.fixture(scope="module")
 def covering(tmp_path_factory):
-    """A daemon that has planned for a room, without local search."""
     folder = tmp_path_factory.mktemp("covering")
     with daemon_process(folder, planner=ANTS) as running, Outsider(running.endpoint) as outsider:
         for name in ("coverage", "pheromone"):

@@ -36,7 +36,6 @@ class Held:
 
 
 def held_by(pid: int) -> Held:
-    """Count what a process holds, also children that it has not waited for."""
     process = Path(f"/proc/{pid}")
     threads = list((process / "task").iterdir())
     children = (thread / "children" for thread in threads)
@@ -56,8 +55,6 @@ def squares() -> Iterator[tuple[float, float, float, float]]:
 
 
 def wait_replaced(outsider: Outsider, config: Callable[[dict], bool]) -> None:
-    """Wait until a mission with this configuration has planned."""
-
     def holds() -> bool:
         status = outsider.ask_status()
         return config(status["config"]["mission"]) and status["state"] == "covering"
@@ -104,7 +101,6 @@ def test_a_replaced_mission_releases_its_memory(tmp_path, replace):
 
 
 def kept(before: Held, after: Held) -> list[str]:
-    """Return what has grown since, of each kind."""
     most = Held(
         children=0,
         threads=before.threads + 2,  # Zenoh starts and ends some of its own

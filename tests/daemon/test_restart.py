@@ -38,7 +38,6 @@ COVERED = 100
 
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What a daemon left whose robot has covered a part of the hall."""
     folder = tmp_path_factory.mktemp("ended")
     with daemon_process(folder) as running, Outsider(running.endpoint) as outsider:
         begin(outsider)
@@ -48,7 +47,6 @@ def ended(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def covered(ended: Path, tmp_path: Path) -> Path:
-    """A folder with a copy of that."""
     shutil.copytree(ended, tmp_path / "state")
     return tmp_path
 
@@ -58,7 +56,6 @@ def state_files(folder: Path) -> list[str]:
 
 
 def wait_cells(folder: Path, cells: int) -> None:
-    """Wait until so many cells are on the disk; a daemon may be writing them just now."""
     newest, written = folder / "state" / "robot.ledger", 0
     while written < cells:
         time.sleep(0.05)

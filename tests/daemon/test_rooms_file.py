@@ -43,7 +43,6 @@ def two_rooms(frame="map"):
 
 
 def full():
-    """Rooms of two frames, with everything that they can have."""
     book = two_rooms("downstairs")
     for _ in range(HOLD_CHANGE):
         update(book, found(), "map")

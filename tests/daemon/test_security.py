@@ -52,7 +52,6 @@ def mission(status):
 
 @pytest.fixture
 def unharmed(boss):
-    """The mission is afterwards as it was before."""
     before = boss.ask_status()
     yield
     time.sleep(SILENCE_S)

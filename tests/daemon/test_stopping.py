@@ -25,7 +25,6 @@ ENDLESS = {"ants": 1_000_000, "budget_s": 3600.0}
 
 
 def cluttered(size_m: float) -> np.ndarray:
-    """Return a room with a pillar every two metres: long walks, many dead ends."""
     pixels = room(size_m, size_m)
     for row in range(4):
         for col in range(4):
@@ -89,7 +88,6 @@ def test_it_answers_while_it_plans(tmp_path):
 
 @contextmanager
 def recording_into(folder):
-    """A daemon that records, and the process of its recorder."""
     pytest.importorskip("rerun")
     with (
         daemon_process(folder, "--record", str(folder)) as running,

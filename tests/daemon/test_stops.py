@@ -19,7 +19,6 @@ OVER_ROBOT = fill(BLANK, 0.3, 0.3, 2.0, 2.0, WALL)
 
 
 def drive(outsider, paths):
-    """Send map and pose until there is a path to drive; return how many paths have come."""
     deadline = time.monotonic() + TIMEOUT_S
     while not any(map(is_driven, paths.heard)):
         assert time.monotonic() < deadline, outsider.ask_status()
@@ -40,7 +39,6 @@ def stops(heard):
 
 @pytest.fixture
 def bus():
-    """The ``bus`` section of daemons at a router that outlives them."""
     endpoint = free_endpoint()
     with router_process(endpoint):
         yield {"listen": [], "connect": [endpoint], "mode": "client"}

@@ -33,8 +33,6 @@ OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 @dataclass
 class Battery:
-    """A battery that publishes its level, which changes by ``step`` with each message."""
-
     outsider: Outsider
     level: float = 0.18
     step: float = 0.0
@@ -109,7 +107,6 @@ def test_all_outputs_report_a_dead_dock(tmp_path):
 
 
 def before_a_mission():
-    """Return a status board, and what it reports of: nothing has come yet."""
     config = DaemonConfig()
     keeper = LedgerKeeper(NoDisk(), config.cell_m, autostart=True)
     return StatusBoard(config), MissionRunner(config, keeper, make_mailbox(100)), keeper

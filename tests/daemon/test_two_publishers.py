@@ -27,7 +27,6 @@ PERIOD_S, TURNS = 0.1, 20
 
 @contextmanager
 def program(endpoint, *, stamps=True):
-    """A session of somebody's; timestamps on its samples say whose they are."""
     text = {"mode": "client", "connect": {"endpoints": [endpoint]}}
     text["timestamping"] = {"enabled": stamps}
     with zenoh.open(zenoh.Config.from_json5(json.dumps(text))) as opened:

@@ -31,7 +31,6 @@ def far_map(x, y):
 
 
 def stand(client, holds, x=0.75, y=0.75):
-    """Say where the robot stands until the status is as it should be."""
     deadline = time.monotonic() + 60.0
     while not holds(status := client.ask_status()):
         assert time.monotonic() < deadline, status

@@ -30,7 +30,6 @@ class FleetRobot:
         self.go()
 
     def look(self) -> None:
-        """Publish the map: a daemon that starts needs it."""
         self.seat.put("map", map_bytes(self.floor))
 
     def go(self) -> None:

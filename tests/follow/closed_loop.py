@@ -72,11 +72,9 @@ class ClosedLoop:
         self.run(lambda: self.now > until)
 
     def drive(self, most_s=600.0):
-        """Let it drive its path to the end; return the seconds that took."""
         return self.run(lambda: self.follower.state is FollowerState.DRIVEN, most_s)
 
     def run(self, until, most_s=600.0):
-        """Let time pass until ``until()`` holds; return the seconds that took."""
         begun = self.now
         while not until():
             assert self.now - begun < most_s, (self.follower.state, self.follower.detail)

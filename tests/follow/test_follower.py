@@ -18,8 +18,6 @@ AHEAD = [(0.0, 0.0), (5.0, 0.0), (5.0, 5.0)]
 
 
 class Told:
-    """A follower that drives ahead, and time that passes."""
-
     def __init__(self):
         self.now = 10.0
         self.begin_anew(AHEAD)
@@ -42,7 +40,6 @@ class Told:
         self.follower.pose_fault = MalformedMessage(why)
 
     def states_where_it_is(self, seconds):
-        """Return the state of each step while the pose stays as it is."""
         states = []
         for _ in range(round(seconds / PERIOD_S)):
             self.pose()

@@ -37,7 +37,6 @@ def wait(holds, log):
 
 
 def listen(base):
-    """Return where the robot is, pose by pose."""
     poses = []
     schema = "geometry_msgs/msg/PoseStamped"
     base.bus.subscribe(
@@ -54,7 +53,6 @@ def undisturbed(done):
 
 @contextmanager
 def driving(base, folder, domain=7, nav2=None, **robot):
-    """A look-alike of Nav2 at 0, 0, a follower and a daemon that plans; where the follower logs."""
     wanted = {"endpoint": base.endpoint, "domain": domain, "start": (0.0, 0.0), **robot}
     ros2 = {**kind_of(domain), "nav2": nav2 or {}}
     with Robot(**wanted) as look_alike, nav2_follower(folder, base.endpoint, ros2) as log:

@@ -51,7 +51,6 @@ class Pauses:
 
 
 def planned(grid: OccupancyGrid, seed: int, pauses: Pauses, observe=ignore, line="thorough"):
-    """Return the ground, walk and line of a search that ends after some pauses."""
     search = fe.Search(seed=seed, budget_s=1e6)
     ground = PlanGround.of_floor(grid, ROBOT, (0.5, 0.5), WALLS)
     ending = SearchEnd(None, pauses, lambda _: None, None)

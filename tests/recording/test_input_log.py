@@ -38,8 +38,6 @@ BEGAN_NS = 1_700_000_000 * SECOND_NS
 
 @dataclass
 class Desk:
-    """A writer with an input log, and a clock that runs as fast as the test."""
-
     folder: Path
     part_bytes: int = 10**9
     now_ns: int = 0
@@ -61,7 +59,6 @@ class Desk:
         return arrival
 
     def close(self) -> list[Path]:
-        """End the recording; return its parts."""
         self.inputs.finish()
         assert self.writer.close()
         return parts(self.folder)
@@ -222,7 +219,6 @@ def test_a_recorder_reports_while_it_catches_up(tmp_path, monkeypatch):
 
 
 def hear(one, bus, count):
-    """Let poses wait for a recorder; return what they are."""
     one.listen()
     publisher = Sender(bus, topics.POSE)
     poses = [encode_pose_stamped(StampedPose(Pose2D(x, 0.0), "map", x)) for x in range(count)]

@@ -58,8 +58,6 @@ STRIPS = "LineStrips3D:strips"
 
 @dataclass(frozen=True)
 class Recorded:
-    """A mission that was recorded and ended by SIGTERM."""
-
     path: Path
     mission: Mission
     summary: RecordingSummary

@@ -33,11 +33,9 @@ class Served:
         return f"http://{self.address}/"
 
     def descriptors(self) -> int:
-        """Return how many files and sockets it has open."""
         return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
 
     def get(self, path: str = "/", **headers: str) -> tuple[int, dict[str, str], str]:
-        """Return status, headers and body of what is at ``path``."""
         names = {name.replace("_", "-"): value for name, value in headers.items()}
         request = urllib.request.Request(f"http://{self.address}{path}", headers=names)
         try:
@@ -53,7 +51,6 @@ def served(folder: Path, endpoint: str, *words: str) -> AbstractContextManager[S
 
 @contextmanager
 def serving(folder: Path, *words: str) -> Iterator[Served]:
-    """Serve a page; end it, and check how it ended."""
     address = free_endpoint().removeprefix("tcp/")
     log = folder / f"serve-{address.rpartition(':')[2]}.log"
     command = [*PROGRAM, "serve", "--listen", address, *words]
@@ -108,7 +105,6 @@ class Looker:
         return message
 
     def wait(self, kind: str, holds: Callable[[Any], bool] = lambda _: True) -> Any:
-        """Return the first message of a kind, that came or comes, for which ``holds``."""
         if kind in self.seen and holds(self.seen[kind]):
             return self.seen[kind]
         deadline = time.monotonic() + TIMEOUT_S
@@ -121,7 +117,6 @@ class Looker:
     def command(
         self, name: str, order: dict[str, Any] | None = None, **more: Any
     ) -> dict[str, Any]:
-        """Command, again where a busy daemon does not answer in time; return the answer."""
         more |= {} if order is None else {"order": order}
         deadline = time.monotonic() + TIMEOUT_S
         while True:
@@ -134,7 +129,6 @@ class Looker:
 
 @contextmanager
 def looking(page: Served, token: str = "", **options: Any) -> Iterator[Looker]:
-    """Open a page as a viewer."""
     # One that is not read for a while, as a daemon starts, goes on to answer pings.
     unbounded: dict[str, Any] = {"max_size": None, "max_queue": None, "ping_interval": None}
     url = f"ws://{page.address}/live"

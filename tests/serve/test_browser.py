@@ -81,12 +81,10 @@ class Tab:
         return self.call("Runtime.evaluate", expression=text)["result"].get("value")
 
     def click(self, name: str) -> None:
-        """Click a button that can be seen."""
         until(lambda: self.js(f"find({name!r}).offsetParent !== null"), why=lambda: name)
         self.js(f"find({name!r}).click()")
 
     def size(self, size: tuple[int, int], scheme: str) -> None:
-        """Be a screen of that size, light or dark."""
         width, height = size
         screen = {"width": width, "height": height, "deviceScaleFactor": 1}
         self.call("Emulation.setDeviceMetricsOverride", **screen, mobile=size == PHONE)
@@ -105,7 +103,6 @@ class Tab:
         self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
     def on_screen(self, x: float, y: float) -> tuple[float, float]:
-        """Return where a point of the map is on the screen."""
         box = "canvas.getBoundingClientRect()"
         text = f"JSON.stringify([toScreen({x}, {y}), {box}.left, {box}.top])"
         (px, py), left, top = json.loads(self.js(text))
@@ -114,7 +111,6 @@ class Tab:
 
 @contextmanager
 def browsing(url: str, folder: Path) -> Iterator[Tab]:
-    """Open a page in a browser of its own."""
     options = ("--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0")
     words = (*options, f"--user-data-dir={folder}", "about:blank")
     quiet = subprocess.DEVNULL
@@ -141,7 +137,6 @@ def browsing(url: str, folder: Path) -> Iterator[Tab]:
 
 
 def pages_at(listed: str) -> list[dict[str, Any]]:
-    """Return the tabs that a browser lists."""
     with urllib.request.urlopen(listed, timeout=TIMEOUT_S) as answer:
         return [tab for tab in json.loads(answer.read()) if tab["type"] == "page"]
 
@@ -162,7 +157,6 @@ def pause_and_reload(tab: Tab, outsider: Outsider, url: str) -> None:
 
 
 def order_again(tab: Tab, outsider: Outsider, url: str) -> None:
-    """Give the order that was cancelled again, by one tap on a page opened anew."""
     tab.call("Page.navigate", url=url)
     until(lambda: tab.js("find('again').textContent") == "Last order again: area 1")
     photograph(tab, "again")
@@ -174,7 +168,6 @@ def order_again(tab: Tab, outsider: Outsider, url: str) -> None:
 
 
 def canceled(tab: Tab, outsider: Outsider) -> bool:
-    """Tap on Cancel, seen or not; tell whether there is no order any more."""
     tab.js("find('cancel').click()")
     return outsider.ask_status()["mission"]["ordered"] is None
 
@@ -248,7 +241,6 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
 
 
 def offers_to_start_what_is_drawn(tab: Tab) -> None:
-    """Draw an area in a mission that ends then: the button below the map says what it does."""
     tab.js("drawing.kind = 'zone'; finish([[1, 1], [2, 1], [2, 2]])")
     said = tab.js("""(() => {
       const texts = [], state = model.state;
@@ -264,7 +256,6 @@ def offers_to_start_what_is_drawn(tab: Tab) -> None:
 
 
 def keep_out_of_no_floor(tab: Tab) -> None:
-    """Add and remove a keep-out where no floor is known yet: it is taken, and that is said."""
     far = '{ name: "far", polygon: [[500, 500], [501, 500], [501, 501]] }'
     tab.js(f'command("keep_out_add", {{ keep_out: {far} }})')
     until(lambda: "seen no floor" in tab.js("find('answer').textContent"))
@@ -409,7 +400,6 @@ def test_with_an_older_daemon_the_page_explains_missing_places(tmp_path):
 
 
 def show_left(tab: Tab, reason: str) -> None:
-    """Tap on a reason for which floor is not swept, until it is painted."""
     tab.js("find('left').open = true")
     every = "[...find('left').querySelectorAll('button')]"
     until(lambda: tab.js(f"{every}.some((b) => b.textContent.includes({reason!r}))"))
@@ -446,13 +436,11 @@ def draw_keep_out(tab: Tab, low: tuple[float, float], high: tuple[float, float])
 
 
 def button(tab: Tab, text: str) -> bool:
-    """Tell whether a button with that text can be seen."""
     every = f"[...document.querySelectorAll('button')].filter((b) => b.textContent === {text!r})"
     return bool(tab.js(f"{every}.some((b) => b.offsetParent !== null)"))
 
 
 def press(tab: Tab, text: str) -> None:
-    """Press the button that has that text."""
     until(lambda: button(tab, text), why=lambda: text)
     every = f"[...document.querySelectorAll('button')].filter((b) => b.textContent === {text!r})"
     tab.js(f"{every}.find((b) => b.offsetParent !== null).click()")

@@ -28,7 +28,6 @@ def status(**members: object) -> Status:
 
 
 def told(of: Status) -> list[str]:
-    """Return all texts for an owner about a status."""
     return [
         plain.word(of.state),
         plain.does(of),
@@ -157,6 +156,5 @@ def test_a_robot_without_a_map_is_shown_so():
 
 
 def told_left(of: Status, ordered: Status | None = None) -> list[tuple[object, ...]]:
-    """Return the parts of the floor that are left."""
     parts = plain.left(of, ordered)
     return [(part.m2 and round(part.m2, 3), part.reason, part.marks, part.places) for part in parts]

@@ -104,7 +104,6 @@ def test_no_area_has_no_label():
 
 @contextmanager
 def two_rooms_shown(folder):
-    """Yield a page that shows a map of two rooms, and who published the map."""
     with (
         daemon_process(folder, mission={"autostart": False}) as daemon,
         Outsider(daemon.endpoint) as outsider,
@@ -174,7 +173,6 @@ def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
 
 
 def order_both(tab: Tab, outsider: Outsider) -> None:
-    """Order the picked bath, then the kitchen: in the order of the taps, each as it is set."""
     tab.click("chooseroom")
     tap(tab, 1.05, 2.5)
     tab.click("chooseroom")
@@ -201,13 +199,11 @@ def order_both(tab: Tab, outsider: Outsider) -> None:
 
 
 def is_said_in_view(tab: Tab) -> bool:
-    """Tell whether all of an answer is on the screen, wherever the page is scrolled to."""
     tops = (0, 9_999)
     return all(tab.js(f"scrollTo(0, {top}); {IN_VIEW}") for top in tops)
 
 
 def tap(tab: Tab, x: float, y: float) -> None:
-    """Tap on a room, until its card is shown."""
     tab.js("canvas.scrollIntoView()")
     tab.touch(tab.on_screen(x, y))
     until(lambda: tab.js("find('room').offsetParent !== null"))

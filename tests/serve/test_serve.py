@@ -53,13 +53,11 @@ ROOM = {"name": "by the door", "polygon": [[0.5, 0.5], [3.0, 0.5], [3.0, 3.0], [
 
 
 def is_told(said: dict[str, Any]) -> bool:
-    """Return whether a state is that of the robot here; as that does not move, later degraded."""
     return said.get("state") in ("covering", "degraded")
 
 
 @pytest.fixture(scope="module")
 def covering(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A daemon whose robot is on its way, with a zone and a keep-out of its own."""
     mission = {
         "zones": [{"name": "corner", "polygon": [[3, 3], [5, 3], [5, 4], [3, 4]]}],
         "keep_out": [[[4, 1], [4.5, 1], [4.5, 1.5], [4, 1.5]]],
@@ -357,7 +355,6 @@ def test_a_call_from_two_origins_is_refused_in_order(page):
 
 
 def can_look(page: Served) -> bool:
-    """Tell whether there is room for a viewer."""
     try:
         with looking(page) as looker:
             return bool(looker.wait("welcome"))
@@ -399,7 +396,6 @@ def is_of(pixels: np.ndarray) -> Callable[[Any], bool]:
 
 
 def upgrade(page: Served, *more: str) -> bytes:
-    """Return what a browser asks for a WebSocket with; ``more`` are headers."""
     key = base64.b64encode(b"0123456789abcdef").decode()
     lines = (
         "GET /live HTTP/1.1",
@@ -413,7 +409,6 @@ def upgrade(page: Served, *more: str) -> bytes:
 
 
 def opened(page: Served) -> socket.socket:
-    """Return the socket of a viewer that says nothing."""
     host, _, port = page.address.rpartition(":")
     silent = socket.create_connection((host, int(port)), TIMEOUT_S)
     silent.sendall(upgrade(page))
@@ -422,7 +417,6 @@ def opened(page: Served) -> socket.socket:
 
 
 def hanging(page: Served) -> socket.socket:
-    """Return a viewer's socket that says hello and reads nothing."""
     host, _, port = page.address.rpartition(":")
     hung = socket.socket()
     hung.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)

@@ -12,15 +12,12 @@ from tests.support.processes import ENVIRONMENT, PROGRAM
 
 
 class Terminal(terminal.Terminal):
-    """A terminal with ``watch`` in it."""
-
     def __init__(self, *words: str, **options: Any) -> None:
         super().__init__("watch", *words, **options)
 
 
 @contextmanager
 def piped(*words: str) -> Iterator[subprocess.Popen[str]]:
-    """Run ``watch`` into pipes; whatever happens meanwhile, it is over afterwards."""
     with subprocess.Popen(
         [*PROGRAM, "watch", *words],
         stdout=subprocess.PIPE,

@@ -26,7 +26,6 @@ WATCH_MB = 30.0
 
 @pytest.fixture(scope="module")
 def covering(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A daemon whose robot is on its way; map and pose are of an outsider who has gone."""
     with daemon_process(tmp_path_factory.mktemp("daemon")) as running:
         with Outsider(running.endpoint) as outsider:
             begin(outsider)

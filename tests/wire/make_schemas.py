@@ -131,6 +131,5 @@ def descriptions(docstring: str) -> dict[str, str]:
 
 
 def write(into: Path) -> None:
-    """Write all files to ``into``."""
     for name, content in files().items():
         (into / name).write_text(content)

@@ -25,17 +25,14 @@ FRAMES = ("", "m", "ma", "map", "odom", "robot1", "robot1/map", "FuÃŸboden", "åœ
 
 
 def to_bytes(schema: str, message: object) -> bytes:
-    """Return ``message`` in little-endian CDR."""
     return bytes(STORE.serialize_cdr(message, schema, little_endian=True))
 
 
 def from_bytes(schema: str, payload: bytes) -> Any:
-    """Return the message in ``payload``."""
     return STORE.deserialize_cdr(payload, schema)
 
 
 def make(schema: str, **fields: object) -> Any:
-    """Return a message of type ``schema``."""
     return STORE.types[schema](**fields)
 
 

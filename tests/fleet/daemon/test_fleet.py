@@ -27,7 +27,6 @@ def router():
 
 @pytest.fixture(scope="module")
 def fleet(router, tmp_path_factory):
-    """A daemon of each robot, in a process of its own, joined to the router."""
     with contextlib.ExitStack() as stack:
         for name in FLEET:
             bus = {"mode": "client", "listen": [], "connect": [router]}

@@ -119,7 +119,6 @@ def test_a_newer_division_without_this_robot_hides_no_other():
 
 
 def sweeps_everything_again(robot):
-    """Order everything, whoever has covered it."""
     zone = {"name": "hall", "polygon": rectangle(0, 0, 12, 24)}
     return robot.command("start", {"zones": [zone]})
 
@@ -477,7 +476,6 @@ def test_repeated_or_reordered_messages_of_an_epoch_are_harmless(sweeps, data):
 
 
 def tiles_of(cells):
-    """Cells as a robot tells them."""
     ledger = CoverageLedger(1.0)
     for cell in cells:
         ledger.visit(cell)

@@ -134,7 +134,6 @@ def test_lost_ground_is_sent_as_lost():
 
 @pytest.fixture
 def members():
-    """What r1 knows of r2, which can reach more than itself."""
     ledger = MissionLedger(CELL, CELL, shared=SharedProgress())
     ledger.move_to("map")
     ledger.shared.begin_epoch(1)

@@ -37,8 +37,6 @@ TEXT = "TextLog:text"
 
 
 class Studio:
-    """A recorder in this process, and the bus that robots talk to it over."""
-
     def __init__(self, bus, recorder, out):
         self.bus, self.recorder, self.out = bus, recorder, out
 
@@ -48,7 +46,6 @@ class Studio:
             self.recorder.step(0.02)
 
     def until(self, holds, most_s=30.0):
-        """Let the recorder work until something holds."""
         until = time.monotonic() + most_s
         while not holds():
             assert time.monotonic() < until
@@ -61,7 +58,6 @@ class Studio:
         return self.recorder._scene._drawn[name].known is not None
 
     def parts(self):
-        """End the recording; return its parts."""
         assert self.recorder.end()
         return sorted(self.out.glob("*.rrd"))
 

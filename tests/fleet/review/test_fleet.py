@@ -30,7 +30,6 @@ GROUND = [(row, col) for row in range(8) for col in range(12)]
 
 
 def noted(robot, way, begin_s, *, waits=(), scale=1.0):
-    """Return notes of a robot that comes into a cell a second, and has swept it then."""
     swept, notes = [], []
     for second, cell in enumerate(way):
         swept.append(cell)
@@ -52,7 +51,6 @@ def lane(row, first, last):
 
 
 def reviewed(monkeypatch, *ways, waits=(), begin_s=0, scale=1.0):
-    """Return the review of robots that drive one after another."""
     robots = [
         NotedRobot(f"r{number + 1}", 0.2, CELL_M, 0.0, 0.0, 0.0, 0.0) for number in range(len(ways))
     ]

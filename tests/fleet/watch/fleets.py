@@ -24,12 +24,10 @@ def tell(view: FleetView, robot: str, topic: str, payload: bytes, now: float = N
 
 
 def say(view: FleetView, robot: str, now: float = NOW, **members: Any) -> None:
-    """Let a robot tell its fleet something, see ``member``."""
     tell(view, robot, "fleet", encode_json(member(**members)), now)
 
 
 def two_in_a_hall() -> FleetView:
-    """Return the view of two robots: one drives east, the other waits for it."""
     view = FleetView("house")
     lane = [(2, col) for col in range(4)]
     ours = {"division": 7, "by": "b", "parts": PARTS}

@@ -30,8 +30,6 @@ HALL = room(9.0, 6.0)
 
 
 class Hall:
-    """Robots of the fleet `house` that stand in a hall and tell of it, until they fall silent."""
-
     def __init__(self, bus: Bus, *names: str, **members: Any) -> None:
         self.tellers = {name: Teller(bus, name) for name in names}
         ours = {"division": 7, "by": "b", "parts": PARTS, **members}
