@@ -20,7 +20,7 @@ from fasaco_edge.doctor import session
 from fasaco_edge.doctor.finding import CheckContext, Level
 from fasaco_edge.host.processes import peak_mb
 from tests.campaigns.memory import Flood, map_payload, update_payload
-from tests.support.outsider import Collector, Outsider
+from tests.support.outsider import Collector, Outsider, joined_daemon
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.router import router_process
@@ -216,10 +216,7 @@ def test_a_waiting_daemon_keeps_only_its_newest_maps(tmp_path):
     maps = {"max_pixels": side * side, "max_lattice_cells": 50_000}
     flood = Flood("updates", side, 0.05, 20.0)
     config = {"map": maps, "robot": {"tool_width_m": 1.0, "radius_m": 0.5}}
-    with (
-        daemon_process(tmp_path, executed=True, **config) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, executed=True, **config) as (running, outsider):
         claim = f"{PREFIX}/claim/0/plans"
         token = outsider.session.liveliness().declare_token(claim)
         outsider.wait_status(lambda status: status["state"] == "blocked")

@@ -13,7 +13,7 @@ from fasaco_edge.host.processes import own_mb
 from tests.daemon.test_mask_topic import MISSION, put_mask
 from tests.daemon.test_service import rewritten, service
 from tests.support.outsider import Outsider
-from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
+from tests.support.rooms import FREE, WALL, fill, room, show_room
 from tests.support.waiting import until
 
 # Number of replacements until all caches are full, and of measured ones after that.
@@ -82,8 +82,7 @@ def test_a_replaced_mission_releases_its_memory(tmp_path, replace):
         service(tmp_path, mission=mission, executed=True) as (running, _),
         Outsider(running.endpoint) as outsider,
     ):
-        outsider.put("map", map_bytes(ROOM))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
+        show_room(outsider, ROOM, 0.75, 0.75)
         if replace is send_mask:
             put_mask(outsider, BLANK)
         outsider.wait_status(lambda status: status["state"] == "covering")

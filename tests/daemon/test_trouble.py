@@ -21,7 +21,7 @@ from tests.mission.test_idle_places import FAR, drive_with, in_or_beside
 from tests.serve.serving import looking, served
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process, fasaco_edge, free_endpoint
-from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.rooms import room, show_room
 from tests.support.ros_robot import DIAGNOSTICS, Naming, ros_robot
 from tests.support.waiting import meanwhile
 from tests.wire import oracle
@@ -66,8 +66,7 @@ def test_all_outputs_report_a_dead_dock(tmp_path):
         looking(page) as looker,
     ):
         diagnostics = robot.listen("diagnostics", DIAGNOSTICS)
-        outsider.put("map", map_bytes(room(3.0, 3.0)))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
+        show_room(outsider, room(3.0, 3.0), 0.75, 0.75)
         battery = Battery(outsider)
         with battery.on():
             status = outsider.wait_status(lambda status: status["state"] == "charging")

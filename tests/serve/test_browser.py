@@ -27,9 +27,18 @@ from websockets.sync.client import ClientConnection, connect
 
 from tests.serve.serving import served
 from tests.serve.test_plain import TECHNICAL
-from tests.support.outsider import TIMEOUT_S, Outsider, open_client
+from tests.support.outsider import TIMEOUT_S, Outsider, joined_daemon, open_client
 from tests.support.processes import daemon_process, free_endpoint
-from tests.support.rooms import HALL, UNKNOWN, begin, drive, fill, lanes, map_bytes, pose_bytes
+from tests.support.rooms import (
+    HALL,
+    UNKNOWN,
+    begin,
+    drive,
+    fill,
+    lanes,
+    map_bytes,
+    show_room,
+)
 from tests.support.router import router_process
 from tests.support.statuses import FULL
 from tests.support.waiting import until
@@ -175,14 +184,12 @@ def canceled(tab: Tab, outsider: Outsider) -> bool:
 @needs_browser
 def test_a_mission_is_ordered_by_finger(tmp_path):
     with (
-        daemon_process(tmp_path, mission={"autostart": False}) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(tmp_path, mission={"autostart": False}) as (daemon, outsider),
         served(tmp_path, daemon.endpoint, "--allow-commands") as page,
         browsing(page.url, tmp_path / "browser") as tab,
     ):
         until(lambda: tab.js("model.role") == "operator")
-        outsider.put("map", map_bytes(HALL))
-        outsider.put("pose", pose_bytes(*lanes(1)[0]))
+        show_room(outsider, HALL, *lanes(1)[0])
         # What is left out is not shown by itself before there was an order.
         until(lambda: tab.js("[find('does').textContent, find('left').open].join()") == READY)
         until(lambda: tab.js("Boolean(model.map && model.map.pixel === 0.05 && model.pose)"))
@@ -265,7 +272,7 @@ def keep_out_of_no_floor(tab: Tab) -> None:
 
 @needs_browser
 def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
-    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (daemon, outsider):
         begin(outsider)
         drive(outsider, lanes(12))
         with (
@@ -327,8 +334,7 @@ def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
 @needs_browser
 def test_a_reason_shows_its_floor_on_the_map_and_nothing_else(tmp_path):
     with (
-        daemon_process(tmp_path, planner={"line": "quick"}) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(tmp_path, planner={"line": "quick"}) as (daemon, outsider),
         served(tmp_path, daemon.endpoint, "--allow-commands") as page,
         browsing(page.url, tmp_path / "browser") as tab,
     ):

@@ -19,9 +19,8 @@ from tests.serve.serving import served
 from tests.serve.test_browser import Tab, browsing, photograph, press
 from tests.serve.test_plain import TECHNICAL
 from tests.serve.test_served_view import heard, tell
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
-from tests.support.rooms import map_bytes, pose_bytes, two_rooms
+from tests.support.outsider import Outsider, joined_daemon
+from tests.support.rooms import show_room, two_rooms
 from tests.support.waiting import until
 
 IN_VIEW = """(() => {
@@ -105,13 +104,11 @@ def test_no_area_has_no_label():
 @contextmanager
 def two_rooms_shown(folder):
     with (
-        daemon_process(folder, mission={"autostart": False}) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(folder, mission={"autostart": False}) as (daemon, outsider),
         served(folder, daemon.endpoint, "--allow-commands") as page,
         browsing(page.url, folder / "browser") as tab,
     ):
-        outsider.put("map", map_bytes(two_rooms(door=True)))
-        outsider.put("pose", pose_bytes(1.05, 1.05))
+        show_room(outsider, two_rooms(door=True), 1.05, 1.05)
         until(lambda: tab.js("foundRooms().length") == 2 and tab.js("Boolean(model.map)"))
         yield tab, outsider
 

@@ -36,7 +36,7 @@ from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS, LiveServer
 from fasaco_edge.wire.keys import Keys
 from tests.serve.serving import Served, listens, looking, served
-from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.outsider import TIMEOUT_S, Outsider, joined_daemon
 from tests.support.processes import (
     Daemon,
     daemon_process,
@@ -44,7 +44,7 @@ from tests.support.processes import (
     free_endpoint,
     mapped_files,
 )
-from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes, update_bytes
+from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes, show_room, update_bytes
 from tests.support.waiting import until
 
 # Memory of its own at most, without pages of files [MB].
@@ -188,8 +188,7 @@ def test_a_mission_is_run_from_the_page(tmp_path):
             looking(page) as looker,
         ):
             assert looker.wait("welcome")["role"] == "operator"
-            outsider.put("map", map_bytes(HALL))
-            outsider.put("pose", pose_bytes(*lanes(1)[0]))
+            show_room(outsider, HALL, *lanes(1)[0])
             outsider.wait_status(lambda status: status["state"] == "idle")
             looker.wait("state", lambda state: state.get("state"))
             keep_out = [[2.0, 2.0], [2.4, 2.0], [2.4, 2.4], [2.0, 2.4]]
@@ -365,8 +364,7 @@ def can_look(page: Served) -> bool:
 def test_a_hanging_viewer_is_dropped_and_blocks_no_other(tmp_path):
     random = np.random.default_rng(1)
     with (
-        daemon_process(tmp_path) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(tmp_path) as (daemon, outsider),
         served(tmp_path, daemon.endpoint) as page,
         looking(page) as looker,
     ):

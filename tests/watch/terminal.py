@@ -15,6 +15,12 @@ class Terminal(terminal.Terminal):
     def __init__(self, *words: str, **options: Any) -> None:
         super().__init__("watch", *words, **options)
 
+    def quit(self) -> None:
+        """Quit by a key; the terminal must be as it was before."""
+        self.type("q")
+        assert self.end() == 0
+        assert self.is_clean()
+
 
 @contextmanager
 def piped(*words: str) -> Iterator[subprocess.Popen[str]]:

@@ -83,9 +83,7 @@ def test_it_shows_all_robots(hall):
         terminal.wait_text("b is gone")
         robots.silent.clear()
         terminal.wait_text("b is back: waits for a")
-        terminal.type("q")
-        assert terminal.end() == 0
-        assert terminal.is_clean()
+        terminal.quit()
         assert "Traceback" not in terminal.written
 
 
@@ -148,9 +146,7 @@ def test_it_outlives_the_router():
             with open_bus(router) as bus, Hall(bus, "a", "b", state=state).published():
                 terminal.wait_text("2 of 2 robots at work")
                 terminal.wait_text(f"b     {state}")
-        terminal.type("q")
-        assert terminal.end() == 0
-        assert terminal.is_clean()
+        terminal.quit()
 
 
 def test_daemons_of_a_fleet_are_shown(tmp_path):
