@@ -45,7 +45,7 @@ from tests.serve.serving import looking, served
 from tests.support.forked import run_forked
 from tests.support.outsider import Outsider
 from tests.support.processes import COMMAND_S, ENVIRONMENT, PROGRAM, daemon_process, free_endpoint
-from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.rooms import map_bytes, pose_bytes, room, show_room
 from tests.test_text import hidden
 from tests.wire.schemas import NAMES, schema
 
@@ -340,8 +340,7 @@ def test_a_daemon_logs_and_notifies_in_lines_of_its_own(tmp_path):
     env = {"NOTIFY_SOCKET": str(address)}
     with daemon_process(tmp_path, env=env) as daemon, Outsider(daemon.endpoint) as outsider:
         order = {"zones": [{"name": TAINT, "polygon": [[0, 0], [1, 0], [1, 1]]}], TAINT: TAINT}
-        outsider.put("map", map_bytes(room(2.4, 1.8)))
-        outsider.put("pose", pose_bytes(0.45, 0.45))
+        show_room(outsider, room(2.4, 1.8), 0.45, 0.45)
         outsider.put("pose", pose_bytes(0.45, 0.45, TAINT))
         outsider.put("map", map_bytes(room(2.4, 1.8), frame=TAINT))
         outsider.session.put(f"{outsider.prefix}/map", TAINT.encode(), encoding=TAINT)

@@ -153,10 +153,7 @@ def _report(args: argparse.Namespace, runs: Sequence[DaemonRun]) -> Report:
             ),
             MeasuredGoal("p99 without planning", delays["rest_ms"]["p99"], GOAL_REST_P99_MS, "ms"),
         ),
-        remarks=(
-            "kernels come from a warm cache",
-            f"peak memory of this process {peak_mb()} MB",
-        ),
+        remarks=("kernels come from a warm cache", f"peak memory of this process {peak_mb()} MB"),
     )
 
 

@@ -128,7 +128,6 @@ class LatchedSubscription(Subscription):
             )
 
     def _query_tokens(self, now: float) -> None:
-        """Query the tokens of the existing publishers."""
         with self._lock:
             if now < self._query_tokens_at or self._awaits_tokens:
                 return

@@ -177,7 +177,6 @@ class Mailbox(Generic[Item]):
             return lost
 
     def _pop(self, kind: str) -> Item:
-        """Remove and return the oldest item of a queued kind."""
         item = self._queued[kind].popleft()
         self._sizes[kind] -= self._size_of(item)
         self._gone[kind] += 1
@@ -186,11 +185,9 @@ class Mailbox(Generic[Item]):
         return item
 
     def _has_to_wait(self, kind: str) -> bool:
-        """Return whether the oldest item of a kind waits for an item of another kind."""
         return kind in self._waits and self._waits[kind][0] > self._gone[self._bounds[kind].after]
 
     def _held(self, now: float) -> tuple[str, ...]:
-        """Return the kinds that have to wait."""
         spacing = self._spacing
         if spacing is None or now >= self._free_at:
             return ()

@@ -46,11 +46,11 @@ class AskedPublisher:
 
 
 class AskedPublishers:
-    """The existing publishers that are queried; the caller holds the lock."""
+    """The existing publishers that are queried, ``open_queries`` now; the caller holds the lock."""
 
     def __init__(self) -> None:
         self._publishers: dict[str, AskedPublisher] = {}
-        self._open = 0
+        self.open_queries = 0
         # Whether to query all publishers, and whether also for samples received already.
         self._wants_all, self._wants_again = True, False
 
@@ -61,14 +61,9 @@ class AskedPublishers:
         return len(self._publishers)
 
     @property
-    def open_queries(self) -> int:
-        """Number of pending queries."""
-        return self._open
-
-    @property
     def is_asking(self) -> bool:
         """Whether a query is pending, or all publishers will be queried next."""
-        return bool(self._open or self._wants_all)
+        return bool(self.open_queries or self._wants_all)
 
     def ask_all(self) -> None:
         """Query all publishers at the next poll, also for samples received already."""
@@ -79,7 +74,7 @@ class AskedPublishers:
         asks_all, again = self._wants_all, self._wants_again
         if asks_all:
             self._wants_all = self._wants_again = False
-            self._open += 1
+            self.open_queries += 1
             for publisher in self._publishers.values():
                 publisher.ask_at = now + ASK_PERIOD_S
         return asks_all, again
@@ -89,12 +84,12 @@ class AskedPublishers:
         due = [one for one in self._publishers.values() if now >= one.ask_at and not one.is_asked]
         for publisher in due:
             publisher.ask_at, publisher.is_asked = now + ASK_PERIOD_S, True
-        self._open += len(due)
+        self.open_queries += len(due)
         return due
 
     def end_query(self, publisher: AskedPublisher | None) -> None:
         """Note that the query to a publisher, or to all (None), has ended."""
-        self._open -= 1
+        self.open_queries -= 1
         if publisher is not None:
             publisher.is_asked = False
 
@@ -245,5 +240,4 @@ def _is_newer(mark: int, last: int | None) -> bool:
 
 
 def _leaves_gap(name: str, mark: int, last: int | None) -> bool:
-    """Return whether samples between the last sample and this one are missing."""
     return last is not None and not name.endswith("/uhlc") and _is_newer(mark, last + 1)

@@ -109,7 +109,6 @@ def session_config(settings: BusSettings) -> zenoh.Config:
 
 
 def _merged(own: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return both configurations merged, mappings recursively."""
     merged = dict(own)
     for key, value in more.items():
         before = own.get(key)

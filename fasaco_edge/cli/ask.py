@@ -208,7 +208,6 @@ def show_rooms(rooms: Rooms) -> None:
 
 
 def _settings(room: RoomReport) -> str:
-    """Return a room's settings as text."""
     words = []
     if isinstance(room.passes, int):
         words.append(f"passes: {room.passes}")

@@ -174,7 +174,6 @@ def _goals(report: Report) -> Table:
 
 
 def _table(title: str) -> Table:
-    """Return an empty table with little space between columns."""
     return Table(
         title=title,
         title_justify="left",

@@ -277,7 +277,6 @@ def _comparison(
 
 
 def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
-    """Return the result of a replay by cycles as rows of text."""
     if compared is None:
         return [("replay", "approximate: there is no turn log from the beginning, or it is unused")]
     cycles = f"{compared.turns_equal} of {compared.turns} cycles"

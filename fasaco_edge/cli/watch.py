@@ -16,6 +16,7 @@ from fasaco_edge.cli.console.arguments import (
     robot_on_bus,
     seconds,
 )
+from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import can_draw, out
 from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.errors import BusUnavailable, FasacoError
@@ -115,7 +116,7 @@ def _once(args: argparse.Namespace, watched: Watched, no_answer: Callable[[], Fa
         trouble = watched.view.trouble
         raise BusUnavailable(trouble) if trouble else no_answer()
     if args.json:
-        live.print_json(watched.document())
+        print_json(watched.document())
         return
     console = out()
     # One line of the screen is left for the prompt.

@@ -99,13 +99,7 @@ class Feed(BusJoining):
     ``with_fleet``: also the fleet messages of all robots.
     """
 
-    def __init__(
-        self,
-        settings: BusSettings,
-        keys: Keys,
-        *,
-        with_fleet: bool = False,
-    ) -> None:
+    def __init__(self, settings: BusSettings, keys: Keys, *, with_fleet: bool = False) -> None:
         super().__init__(settings)
         self._keys = keys
         self._mailbox: Mailbox[object] = Mailbox(QUEUED, size_of=_size_of)

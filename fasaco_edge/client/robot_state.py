@@ -169,7 +169,6 @@ class RobotState:
             self._move(Pose2D(pose.x, pose.y, pose.yaw))
 
     def _watch_growth(self, status: Status, now: float) -> None:
-        """Note when the reachable floor has grown, for the same order."""
         before = self.status
         if before is None or before.coverage is None or _order_of(before) != _order_of(status):
             self._began_at = now

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
@@ -12,12 +12,57 @@ from msgspec import Meta
 from fasaco_edge.bus.access import Role, ros_rights
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.documents import StrictDocument
+from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
 from fasaco_edge.wire.messages.ros_node import TRIGGERED, Triggered
 from fasaco_edge.wire.ros_keys import TRIGGER, Release, RosTopic, graph_key
-from fasaco_edge.wire.ros_topics import ROS_TOPICS
-from fasaco_edge.wire.schemas import TWIST_SCHEMAS
-from fasaco_edge.wire.topics import TF_STATIC
+
+# History depth of tf2's listeners. A bridge keeps the static transforms of all nodes in one
+# history.
+DEPTH = 100
+
+
+class RosRow(NamedTuple):
+    """A ROS 2 topic.
+
+    Attributes:
+        name: its key under ``ros2.topics`` of the configuration.
+        topic: its name in the daemon and in recordings.
+        direction: as seen by the daemon.
+        schemas: allowed message types.
+        latched: transient local.
+        depth: history depth.
+    """
+
+    name: str
+    topic: str
+    direction: Literal["in", "out"]
+    schemas: tuple[str, ...]
+    latched: bool
+    depth: int
+
+
+_TF = (schemas.TF_MESSAGE,)
+_ROS_ROWS = (
+    RosRow("map", "map", "in", topics.MAP.schemas, latched=True, depth=1),
+    RosRow("map_updates", "map_update", "in", topics.MAP_UPDATE.schemas, latched=False, depth=256),
+    RosRow("battery", "battery", "in", topics.BATTERY.schemas, latched=False, depth=16),
+    RosRow("priority", "priority", "in", topics.PRIORITY.schemas, latched=True, depth=1),
+    RosRow("keep_out_mask", "keep_out_mask", "in", topics.MAP.schemas, latched=True, depth=1),
+    RosRow("scan", "scan", "in", topics.SCAN.schemas, latched=False, depth=5),
+    RosRow("pose", "pose", "in", topics.POSE.schemas, latched=False, depth=DEPTH),
+    RosRow("tf", "pose", "in", _TF, latched=False, depth=DEPTH),
+    RosRow("tf_static", topics.TF_STATIC, "in", _TF, latched=True, depth=DEPTH),
+    RosRow("coverage_path", "path", "out", topics.PATH.schemas, latched=True, depth=1),
+    RosRow("coverage_grid", "coverage", "out", topics.COVERAGE.schemas, latched=True, depth=1),
+    RosRow(
+        "diagnostics", "diagnostics", "out", (schemas.DIAGNOSTIC_ARRAY,), latched=False, depth=10
+    ),
+    RosRow("cmd_vel", "cmd_vel", "out", topics.CMD_VEL.schemas, latched=False, depth=1),
+)
+ROS_TOPICS = {row.name: row for row in _ROS_ROWS}
+"""ROS 2 topics by their key under ``ros2.topics`` of the configuration."""
+
 
 # ROS 2 design, "Topic and Service name mapping": letters, digits, _; no digit first.
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
@@ -30,7 +75,7 @@ DEFAULT_NODE = "fasaco_edge"
 # History depth of rclcpp's services.
 SERVICE_DEPTH = 10
 # Inputs that a follower needs: poses, and maps to compare scans with.
-DRIVER_INPUTS = ("map", "map_update", "pose", TF_STATIC)
+DRIVER_INPUTS = ("map", "map_update", "pose", topics.TF_STATIC)
 
 
 def _misfit(key: str, expected: str, name: str) -> BadConfiguration:
@@ -176,7 +221,7 @@ class RosConfig(StrictDocument, frozen=True):
 
     @property
     def _driven_by(self) -> list[str]:
-        return [self.output_key(self.topic("cmd_vel", schema)) for schema in TWIST_SCHEMAS]
+        return [self.output_key(self.topic("cmd_vel", schema)) for schema in schemas.TWIST_SCHEMAS]
 
     @property
     def _graph(self) -> list[str]:

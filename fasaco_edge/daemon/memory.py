@@ -53,10 +53,10 @@ from msgspec import structs
 from fasaco_edge.bus.access import HEADER_BYTES
 from fasaco_edge.bus.mailbox import Queue
 from fasaco_edge.config.config import DaemonConfig, MapConfig
+from fasaco_edge.host.processes import MB
 from fasaco_edge.wire.limits import MAX_BLOCKED_BYTES, MAX_POSE_BYTES, MAX_PRIORITY_BYTES
 from fasaco_edge.wire.topics import QUEUE_LENGTHS
 
-MB = 1_000_000
 MIB = 1 << 20
 # Interpreter, numpy, Zenoh, compiler, kernels, and the fixed part of a plan.
 BASE_BYTES = 235 * MB

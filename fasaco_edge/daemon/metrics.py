@@ -18,6 +18,7 @@ from typing import NamedTuple
 from msgspec import UnsetType
 
 from fasaco_edge.host.addresses import Address
+from fasaco_edge.host.processes import MB
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.replies import STATES, TROUBLES
 from fasaco_edge.wire.documents.status import Status
@@ -34,7 +35,6 @@ REASONS = {200: "OK", 404: "Not Found", 405: "Method Not Allowed", 503: "Service
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 PREFIX = "fasaco_edge"
-MEGABYTE = 1_000_000
 
 Labels = Mapping[str, str]
 LabelledValue = tuple[Labels, float | UnsetType | None]
@@ -150,7 +150,7 @@ METRICS = (
     ),
     Metric("recorder_lost_total", "samples not written", _member("recorder", "lost")),
     Metric("recorder_restarts_total", "restarts of the recorder", _member("recorder", "restarts")),
-    Metric("memory_bytes", "of the process", _one(lambda s: s.rss_mb * MEGABYTE)),
+    Metric("memory_bytes", "of the process", _one(lambda s: s.rss_mb * MB)),
     Metric("processor_seconds_total", "of the process", _one(lambda s: s.cpu_s)),
     Metric("threads", "of the process", _one(lambda s: s.threads)),
 )
@@ -225,7 +225,6 @@ class MetricsServer:
         server.close()
 
     async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Answer one request."""
         self._open.append(writer)
         if len(self._open) > MOST_OPEN:
             self._open.pop(0).transport.abort()

@@ -11,8 +11,7 @@ from fasaco_edge.config.cautions import cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.reload import read_config
 from fasaco_edge.doctor import computer, security, session
-from fasaco_edge.doctor.finding import Check, CheckContext, Finding, fail, ok, warn
-from fasaco_edge.doctor.unit import find_unit
+from fasaco_edge.doctor.finding import Check, CheckContext, Finding, fail, find_unit, ok, warn
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
 CHECKS = (

@@ -83,10 +83,7 @@ def _reach(endpoint: str) -> str:
 
 
 EXPIRES_SOON = timedelta(days=30)
-SECRETS = {
-    "tls": ("private_key",),
-    "user": ("password_file", "dictionary_file"),
-}
+SECRETS = {"tls": ("private_key",), "user": ("password_file", "dictionary_file")}
 HOW_TO = "protocol/security.md, shows how to make them"
 
 

@@ -46,11 +46,7 @@ class PlotView:
 
     @classmethod
     def over(
-        cls,
-        bounds: Bounds,
-        cell_m: float,
-        widest: int = MAX_WIDTH,
-        highest: int = MAX_HEIGHT,
+        cls, bounds: Bounds, cell_m: float, widest: int = MAX_WIDTH, highest: int = MAX_HEIGHT
     ) -> PlotView:
         """Return a view of ``bounds`` (x0, y0, x1, y1) [m], with a margin around.
 

@@ -21,10 +21,7 @@ NEAR_M = 0.2
 
 
 def draw_visits(
-    plot: Plot,
-    lattice: CoverageLattice,
-    visits: NDArray[np.integer],
-    start: Cell,
+    plot: Plot, lattice: CoverageLattice, visits: NDArray[np.integer], start: Cell
 ) -> list[KeyEntry]:
     """Tint the lattice's cells by number of visits; return the tints' legend.
 
@@ -60,10 +57,7 @@ def _reachable(lattice: CoverageLattice, start: Cell) -> NDArray[np.bool_]:
 
 
 def _visit_key(visits: NDArray[np.integer]) -> list[KeyEntry]:
-    key = [
-        *ENDS,
-        _entry("tile", palette.COVERED, "covered once", visits == 1),
-    ]
+    key = [*ENDS, _entry("tile", palette.COVERED, "covered once", visits == 1)]
     most = len(palette.REVISITED) + 1
     for times, colour in enumerate(palette.REVISITED, start=2):
         cells = visits >= times if times == most else visits == times

@@ -157,7 +157,6 @@ class _Interval:
         self._products = self._squares = 0.0
 
     def take(self, place: Place, commanded: Place) -> None:
-        """Take in a pose, and the motion commanded up to that pose."""
         self._first = self._first or (place, commanded)
         self.count += 1
         for axis in range(3):

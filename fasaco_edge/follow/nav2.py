@@ -258,7 +258,6 @@ class Nav2Follower(Supervision):
             self._send(path, path.way)
 
     def _send_next(self, path: PathDriven, goal: SentPiece) -> None:
-        """Send the next goal, once the robot is near enough to its start."""
         if goal.next_start is None:
             goal.next_start = path.start_after(goal, self._ahead, self._near)
         is_there = path.is_near_end(self._here, goal, TIP_M + EARLY_M)

@@ -225,7 +225,6 @@ class LegRoute:
         raise AssertionError("the last leg does not bend")
 
     def _ahead(self) -> Iterator[Leg]:
-        """Yield the legs, from the leg that the robot is on."""
         index = 0
         while (leg := self._leg(index)) is not None:
             yield leg

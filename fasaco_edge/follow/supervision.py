@@ -159,7 +159,6 @@ class Supervision:
         """Follow nothing."""
 
     def _have_none(self, state: FollowerState, detail: str = "") -> None:
-        """Drop the path."""
         self.has_path, self._no_path = False, (state, detail)
         self._withdraw()
 

@@ -153,7 +153,6 @@ def _keys_of_json(text: str) -> list[tuple[str, int]]:
 
 
 def _keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[str, int]]:
-    """Yield each key and its line."""
     if isinstance(node, yaml.MappingNode):
         for name, value in node.value:
             key = f"{before}.{name.value}" if before else str(name.value)

@@ -27,6 +27,7 @@ def python_program(module: str, *words: str) -> list[str]:
     return [sys.executable, shut, "-m", module, *words]
 
 
+MB = 1_000_000
 # Options of mallopt(3), and the values set. Lower thresholds would return more memory, but each
 # page of 4 KB mapped again costs a page fault: with 256 KB, replans of 100,000 cells take 60 ms,
 # not 38.

@@ -45,7 +45,6 @@ class PassPlans:
         return f"<PassPlans {name}, {', '.join(self.names)}{swept}, {self.drive.time}>"
 
     def _repr_png_(self) -> bytes:
-        """Return the picture as PNG, for notebooks."""
         return png_of(self.plot())
 
     @property

@@ -110,7 +110,6 @@ class Plan:
         return f"<Plan {self.map.name}, {self.path.planner}: {', '.join(words)}{above}>"
 
     def _repr_png_(self) -> bytes:
-        """Return the picture as PNG, for notebooks."""
         return png_of(self.plot())
 
     @property

@@ -21,11 +21,7 @@ from fasaco_edge.config.reading import renamed, without_removed
 from fasaco_edge.daemon.loop.inbox import Received, take_batch
 from fasaco_edge.daemon.loop.loop import TICK_S
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
-from fasaco_edge.mission.events import (
-    CommandReceived,
-    PlanReady,
-    PlanRequest,
-)
+from fasaco_edge.mission.events import CommandReceived, PlanReady, PlanRequest
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.path.plan_requests import most_s
 from fasaco_edge.planners.cost import SearchWork
@@ -221,7 +217,6 @@ class Replay:
     def _read_commands(
         self, arrivals: Sequence[Arrival]
     ) -> tuple[list[CommandReceived], list[FasacoError]]:
-        """Return the commands that the daemon took, and the errors of malformed commands."""
         commands, refused = list[CommandReceived](), list[FasacoError]()
         for arrival in arrivals:
             if arrival.topic != COMMAND.name:

@@ -294,7 +294,6 @@ def _end_s(record: RunRecord, data: RunData) -> float:
 
 
 def _mission_states(data: RunData, record: RunRecord) -> list[Entered]:
-    """Return the states that the mission entered, from statuses and drawn states."""
     published = [(each.at_s, each.status.state, each.status.reason) for each in data.statuses]
     drawn = _entered(record, entities.MISSION_STATE, entities.MISSION_LOG)
     return sorted((*published, *drawn), key=lambda entry: entry[0])

@@ -143,7 +143,6 @@ class _Judge:
 
     @cached_property
     def _paths(self) -> list[DrawnLine]:
-        """The drawn paths, in order of time."""
         record = self._review.record
         places = record.drawn.get(entities.PATH, ())
         return [one for one in read_drawings(places, lines_in, record.anchor) if len(one.xy)]
@@ -152,7 +151,6 @@ class _Judge:
         return Spot(round(self._x, 3), round(self._y, 3), swept, why, words)
 
     def spot(self, number: int) -> Spot:
-        """Return a spot with its reason."""
         self._number, (self._x, self._y) = number, self._places[number].tolist()
         grid, floor, footprint = self._data.grid, self._review.all_floor, self._data.footprint
         if grid is None or footprint is None:

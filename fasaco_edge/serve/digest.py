@@ -179,7 +179,6 @@ def _part(mission: MissionReport) -> str:
 
 
 def _comes_more(mission: MissionReport) -> bool:
-    """Return whether another pass or zone follows the current one."""
     if mission.stage != "covering" or mission.passes is None:
         return False
     is_last_pass = (mission.pass_number or 1) >= mission.passes
@@ -188,7 +187,6 @@ def _comes_more(mission: MissionReport) -> bool:
 
 
 def _faults(status: Status) -> Iterator[str]:
-    """Yield troubles and faults as text for engineers."""
     for what, to_do in phrases.troubles(status):
         yield f"{what}. {to_do[:1].upper()}{to_do[1:]}."
     if status.errors.total:

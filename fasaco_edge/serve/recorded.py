@@ -107,7 +107,6 @@ class Playback:
         self._rewind()
 
     def _rewind(self) -> None:
-        """Go back to the beginning of the recording."""
         self._view = RecordedView(self._robot)
         self._at_ns = 0
         self._path: DrawingPlace | None = None

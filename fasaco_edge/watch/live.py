@@ -128,7 +128,7 @@ def watch_as_json(watched: Watched) -> None:
         while not stop.is_set():
             watched.take(FRAME_S)
             for document in watched.documents():
-                print_json(document)
+                print(json_line(document), flush=True)
 
 
 def look_once(watched: Watched, timeout_s: float) -> bool:
@@ -143,11 +143,6 @@ def look_once(watched: Watched, timeout_s: float) -> bool:
         while not (stop.is_set() or watched.is_whole()) and time.monotonic() < deadline:
             watched.take(FRAME_S)
     return True
-
-
-def print_json(document: dict[str, object]) -> None:
-    """Print a JSON object as one line."""
-    print(json_line(document), flush=True)
 
 
 def _print_line(at_s: float, text: str) -> None:

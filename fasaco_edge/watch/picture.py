@@ -17,11 +17,7 @@ from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
-from fasaco_edge.wire.messages.maps import (
-    CoverageValue,
-    decode_map_update,
-    decode_occupancy_grid,
-)
+from fasaco_edge.wire.messages.maps import CoverageValue, decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 
 LEAST_PIXEL_M = 0.01

@@ -45,9 +45,7 @@ TYPE_HASHES = {
 """Hash of each type's definition, in hexadecimal, version 1 (REP 2016)."""
 
 TRIGGER: Final = "std_srvs/srv/Trigger"
-SERVICE_HASHES = {
-    TRIGGER: "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
-}
+SERVICE_HASHES = {TRIGGER: "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"}
 """Hash of each service, over request, response and event."""
 
 GID_BYTES = 16
@@ -180,7 +178,7 @@ def mangled(name: str) -> str:
 
 Call = Literal["send_goal", "cancel_goal", "get_result"]
 CALLS: Final[tuple[Call, ...]] = ("send_goal", "cancel_goal", "get_result")
-_CANCEL: Final = "action_msgs/srv/CancelGoal"
+CANCEL_GOAL: Final = "action_msgs/srv/CancelGoal"
 
 _FOLLOW_PATH: Final = "nav2_msgs/action/FollowPath"
 
@@ -212,7 +210,7 @@ def served_keys(domain: int, action: str, tokens: Iterable[str]) -> dict[Call, s
     """Return the keys of the services named by tokens, for an action of type FollowPath."""
     kinds: dict[Call, str] = {
         "send_goal": dds_type(f"{_FOLLOW_PATH}_SendGoal"),
-        "cancel_goal": dds_type(_CANCEL),
+        "cancel_goal": dds_type(CANCEL_GOAL),
         "get_result": dds_type(f"{_FOLLOW_PATH}_GetResult"),
     }
     found = dict[Call, str]()

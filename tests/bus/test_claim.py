@@ -22,7 +22,6 @@ CALM_S = SETTLE_S + 0.01
 
 
 def planning(own):
-    """A claim that found nobody."""
     claim = Claim(own)
     claim.decide({}, 0.0)
     assert claim.state is ClaimState.LOOKS

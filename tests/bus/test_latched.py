@@ -27,7 +27,6 @@ TIMEOUT_S = 20.0
 
 @contextmanager
 def publishing(endpoint, numbered=True, cache=1):
-    """A session of somebody's that publishes latched, as rmw_zenoh or our mapper does."""
     text = {"mode": "client", "connect": {"endpoints": [endpoint]}}
     text["timestamping"] = {"enabled": True}
     counting = zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None)
@@ -44,8 +43,6 @@ def publishing(endpoint, numbered=True, cache=1):
 
 
 class Spy:
-    """Counts what publishers of the key are asked."""
-
     def __init__(self, session):
         self._asked, self._lock = [], threading.Lock()
         callback = zenoh.handlers.Callback(self._take, indirect=False)
@@ -61,7 +58,6 @@ class Spy:
             return list(self._asked)
 
     def in_rounds(self, rounds):
-        """Questions of ``rounds`` periods, which begin with the next one."""
         begun = len(self.asked())
         until(lambda: len(self.asked()) > begun)
         began = time.monotonic()

@@ -17,8 +17,6 @@ OPEN, WALLED = (
 
 
 class Sessions:
-    """Sessions that are linked directly, and those that only pass on."""
-
     def __init__(self, linked=(), passing=()):
         self.linked, self.passing = set(linked), set(passing)
 

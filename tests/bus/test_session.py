@@ -174,7 +174,6 @@ def test_an_endpoint_without_a_listener_is_an_error_at_once(settings):
 
 @contextmanager
 def subscriber(endpoint):
-    """A process that subscribes, and prints the number in each sample."""
     code = f"""
 import time
 from fasaco_edge.bus.session import open_bus

@@ -37,7 +37,6 @@ def here(tmp_path):
 
 
 def template(name, here):
-    """Return a template, and the YAML in the comment at its head."""
     text = (FOLDER / name).read_text().replace(THERE, str(here))
     head = text.partition("\n{")[0]
     blocks = re.split(r"^//(?! {3}).*$", head, flags=re.MULTILINE)
@@ -47,7 +46,6 @@ def template(name, here):
 
 
 def parts(config):
-    """Return what a template says, whatever the order of keys."""
     return {part: json.loads(config.get_json(part)) for part in PARTS}
 
 

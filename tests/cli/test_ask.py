@@ -16,7 +16,7 @@ from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.query_table import RPC_NAMES
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
-from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.rooms import room, show_room
 
 SAID = {
     "path": "poses ",
@@ -35,8 +35,7 @@ SAID = {
 def endpoint(tmp_path_factory):
     with daemon_process(tmp_path_factory.mktemp("ask")) as running:
         with Outsider(running.endpoint) as outsider:
-            outsider.put("map", map_bytes(room(3.0, 3.0)))
-            outsider.put("pose", pose_bytes(0.75, 0.75))
+            show_room(outsider, room(3.0, 3.0), 0.75, 0.75)
             outsider.wait_status(lambda status: status["state"] == "covering")
             outsider.wait_status(lambda status: status["plan"]["plans"] == 1)
         yield running.endpoint

@@ -59,8 +59,6 @@ ros2: {kind: bridge, domain: 3, namespace: x, topics: {map: map}}
 
 @pytest.fixture
 def check(tmp_path, capsys):
-    """Check a text; return the exit code and what was told as JSON."""
-
     def run(text, *words):
         file = tmp_path / "config.yaml"
         file.write_text(text)

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process, fasaco_edge
+from tests.support.outsider import joined_daemon
+from tests.support.processes import fasaco_edge
 from tests.support.rooms import begin, drive, lanes
 from tests.support.terminal import Terminal
 
@@ -17,8 +17,7 @@ VASE = "0.9,0.9;2.1,0.9;2.1,2.1;0.9,2.1"
 
 @pytest.fixture
 def robot(tmp_path):
-    """A robot that has covered 12 cells."""
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (running, outsider):
         begin(outsider)
         drive(outsider, lanes(12))
         yield running, outsider
@@ -33,7 +32,6 @@ def covered(outsider):
 
 
 def on_terminal(answer, *words):
-    """Run a command on a terminal, answer its question; return its code and what it wrote."""
     with Terminal(*words, columns=200) as shell:
         shell.wait_text("[y/N]")
         shell.type(answer)

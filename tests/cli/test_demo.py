@@ -45,7 +45,6 @@ CORNER = Pose2D(-0.9, -0.3)
 
 @pytest.fixture
 def building(tmp_path):
-    """A map file of two rooms, a door between them and a crate in one."""
     closed = fill(room(3.9, 2.7), 1.8, 0.0, 1.9, 2.7, WALL)
     pixels = fill(fill(closed, 1.8, 0.9, 1.9, 1.8, FREE), 2.8, 1.1, 3.1, 1.4, WALL)
     geometry = GridGeometry(*pixels.shape, RESOLUTION_M, CORNER)

@@ -24,7 +24,6 @@ from tests.support.terminal import Terminal
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A working folder with a map of one room."""
     monkeypatch.chdir(tmp_path)
     pixels = room(2.4, 1.8)
     geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(-1.0, -0.4))

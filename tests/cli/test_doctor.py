@@ -22,8 +22,6 @@ ROLES = {"mapper": ["slam"], "operator": ["boss"]}
 
 @pytest.fixture
 def doctor(tmp_path):
-    """Ask about a bus; return the findings by name, and the exit code."""
-
     def ask(**bus):
         file = tmp_path / "config.yaml"
         file.write_text(yaml.safe_dump({"bus": bus}))
@@ -38,7 +36,6 @@ def doctor(tmp_path):
 
 @pytest.fixture
 def anywhere():
-    """An endpoint for everyone that nobody listens at."""
     return free_endpoint().replace("127.0.0.1", "0.0.0.0")
 
 

@@ -103,8 +103,6 @@ def test_an_existing_file_is_kept(tmp_path, capsys):
 
 @pytest.fixture
 def typed(monkeypatch):
-    """A terminal at which somebody types a text, and then Ctrl-D."""
-
     class Terminal(io.StringIO):
         def isatty(self):
             return True

@@ -14,7 +14,6 @@ from fasaco_edge.cli.console.logs import JournalLine, is_journal
 
 @pytest.fixture
 def journal():
-    """A logger that writes as for the journal, and what it writes."""
     log, written = logging.Logger("test"), StringIO()
     handler = logging.StreamHandler(written)
     handler.setFormatter(JournalLine("%(message)s"))

@@ -10,8 +10,6 @@ from fasaco_edge.cli.console.logs import RateLimiter
 
 
 class Storm:
-    """A logger whose lines are limited, and a clock for it."""
-
     def __init__(self) -> None:
         self.now = 0.0
         self.lines: list[str] = []

@@ -28,7 +28,6 @@ MAP = "{image: map.png, resolution: 0.05, origin: [0, 0, 0], negate: 0}"
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with a good grid, a bad one, and a file that is none."""
     monkeypatch.chdir(tmp_path)
     np.save("good.npy", np.ones((6, 6), bool))
     blocked = np.ones((6, 6), bool)
@@ -83,11 +82,7 @@ def folder(tmp_path, monkeypatch):
         ("plan good.npy --path-out good.npy", 78, "cannot write good.npy: it is an input"),
         ("plan good.npy --png w --path-out ./w", 78, "cannot write w: another option writes it"),
         ("plan map.yaml --png link.png", 78, "cannot write link.png: it is an input"),
-        (
-            "plan good.npy --planner mine.py:f --png mine.py",
-            78,
-            "cannot write mine.py: it is an input",
-        ),
+        ("plan good.npy --planner mine.py:f --png mine.py", 78, "cannot write mine.py: it is an"),
         ("simulate map.yaml --trail-out map.png", 78, "cannot write map.png: it is an input"),
         ("review a.rrd --png a.rrd", 78, "cannot write a.rrd: it is an input"),
         ("review a.rrd --against b.rrd --png b.rrd", 78, "cannot write b.rrd: it is an input"),
@@ -98,11 +93,7 @@ def folder(tmp_path, monkeypatch):
         ),
         ("plan good.npy --png around", 78, "cannot write around: Too many levels of symbolic"),
         (f"plan good.npy --png {'w' * 300}", 78, "File name too long"),
-        (
-            "plan good.npy --xy-out l.csv",
-            78,
-            "good.npy is a coverage grid (.npy), which lies in no",
-        ),
+        ("plan good.npy --xy-out l.csv", 78, "good.npy is a coverage grid (.npy), which lies in"),
         (f"simulate nowhere --connect {NOBODY}", 1, "no map 'nowhere'"),
         (
             f"simulate office --speed 0 --connect {NOBODY}",
@@ -123,11 +114,7 @@ def folder(tmp_path, monkeypatch):
         ("simulate office --connect office", 78, "'office': no protocol before the address"),
         (f"record --out . --connect {NOBODY}", 1, f"cannot connect to {NOBODY}\n"),
         (f"record --out . --base /x --connect {NOBODY}", 78, "base: must be chunks"),
-        (
-            f"record --out . --quota-mb -5 --connect {NOBODY}",
-            78,
-            "--quota-mb: expected a whole number of at least 0, got -5",
-        ),
+        (f"record --out . --quota-mb -5 --connect {NOBODY}", 78, "--quota-mb: expected a whole"),
         (
             f"record --out . --quota-mb 100 --connect {NOBODY}",
             78,
@@ -190,10 +177,7 @@ def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said)
         ("mission strat", "did you mean start?"),
         ("run map.yaml", "unrecognized arguments: map.yaml; did you mean --config map.yaml?"),
         ("mission --config map.yaml status", "options such as --config come after the command"),
-        (
-            "mission --json status",
-            "arguments: --json; options such as --json come after the command",
-        ),
+        ("mission --json status", "arguments: --json; options such as --json come after"),
         ("--config=map.yaml run", "options such as --config come after the command"),
         ("mission -v strat", "invalid choice: 'strat'; did you mean start?"),
         ("mission start zones.yaml", "zones.yaml; did you mean --order zones.yaml?"),
@@ -205,10 +189,7 @@ def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said)
         ("plan office --start-xy 1,1e300", "must be within 2e+07 m of 0, got 1,1e300"),
         ("plan office --start 1,1 --start-xy 1,1", "not allowed with argument --start"),
         ("plan office --end there", "--end: must be anywhere, home or row,column, got 'there'"),
-        (
-            "plan office --cell wide",
-            "argument --cell/--tool-width: must be a number of metres, got 'wide'",
-        ),
+        ("plan office --cell wide", "argument --cell/--tool-width: must be a number of metres"),
         ("plan office --cell 0,3", "must be a number of metres, got '0,3'; did you mean 0.3?"),
         ("simulate flat --range 3m", "argument --range: must be a number of metres, got '3m'"),
         ("mission start --until-min 1h", "must be a number of minutes, got '1h'"),

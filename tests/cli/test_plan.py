@@ -38,8 +38,6 @@ KEYS = set(NAMES.split())
 
 @pytest.fixture
 def plan(tmp_path, capsys):
-    """Plan in this process; return the figures and the walk, a list of cells."""
-
     def run(*words):
         csv = tmp_path / "walk.csv"
         words = [str(word) for word in words]
@@ -89,7 +87,6 @@ ORIGIN = Pose2D(0.0, 0.0)
 
 
 def room_file(folder, origin=ORIGIN):
-    """Write the map of a room with a pillar; return its file."""
     pixels, file = pillared_room(), folder / "room.yaml"
     write_map(OccupancyGrid(GridGeometry(*pixels.shape, 0.05, origin), pixels), file)
     return file
@@ -97,7 +94,6 @@ def room_file(folder, origin=ORIGIN):
 
 @pytest.fixture
 def grid_file(tmp_path):
-    """A coverage grid with two areas that do not touch."""
     free = np.ones((9, 12), bool)
     free[:, 8] = False
     free[3:5, 2:4] = False

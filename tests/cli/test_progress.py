@@ -24,14 +24,12 @@ SIMULATE = ("simulate", "flat", "--speed", "10", "--connect")
 
 
 def no_escape_is_shown(shell: Terminal) -> None:
-    """Check that all escapes reached the terminal as such."""
     assert "\\x1b" not in shell.written
     text = "\n".join(shell.screen())
     assert not re.search(r"\^\[|\[2K|\[\d*A|\[\?25|\[\d[\d;]*m", text), text
 
 
 def ended_well(shell: Terminal, code: int = 0) -> str:
-    """Return what is seen after the command; check that nothing is left of its progress."""
     assert shell.end() == code, shell.written
     no_escape_is_shown(shell)
     assert shell.is_clean()
@@ -42,7 +40,6 @@ def ended_well(shell: Terminal, code: int = 0) -> str:
 
 @pytest.fixture
 def recording(tmp_path):
-    """A recorded mission."""
     pytest.importorskip("rerun")
     path = tmp_path / "mission.rrd"
     path.write_bytes(lzma.decompress(RECORDING.read_bytes()))

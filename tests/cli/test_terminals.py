@@ -23,7 +23,6 @@ COLOUR = re.compile(r"\x1b\[(?:\d+;)*(?:3[0-8]|4[0-8]|9[0-7])[;m]")
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A folder with a recording and configurations; a daemon whose robot is on its way."""
     pytest.importorskip("rerun")
     folder = tmp_path_factory.mktemp("place")
     packed = (ROOT / "tests/data/mission.rrd.xz").read_bytes()
@@ -81,7 +80,6 @@ def test_no_command_is_left_out():
 
 
 def check_shown(shell, env):
-    """Check that nothing is wider than the terminal, or not for it."""
     assert "\\x1b" not in shell.written
     wrapped = [
         line

@@ -32,7 +32,6 @@ print(sum(sum(kernel.stats.cache_misses.values()) for kernel in kernels))
 
 @pytest.fixture(scope="module")
 def ready():
-    """What a warm-up tells that found all kernels, or has compiled them."""
     return json.loads(fasaco_edge("warmup", "--json").out)
 
 

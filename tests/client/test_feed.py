@@ -36,5 +36,4 @@ def test_the_field_is_listened_to_only_while_it_is_shown(endpoint, early):
 
 
 def payloads(feed):
-    """What came since, as (topic, payload)."""
     return [(topic, getattr(item, "payload", b"")) for topic, item in feed.take(0.0)]

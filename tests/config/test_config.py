@@ -25,8 +25,6 @@ from tests.support.examples import examples
 
 @pytest.fixture
 def load(tmp_path: Path) -> Any:
-    """Load a configuration from its text."""
-
     def write_and_load(text: str) -> DaemonConfig:
         file = tmp_path / "config.yaml"
         file.write_text(text)
@@ -118,48 +116,22 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ("robot: {radius_m: wide}", "robot.radius_m: expected a number, got 'wide'"),
         ("robot: {radius_m: true}", "robot.radius_m: expected a number, got true"),
         ("robot: {radius_m: }", "robot.radius_m: expected a number, got null"),
-        (
-            "robot: {clearance_m: -0.01}",
-            "robot.clearance_m: expected a number of at least 0, got -0.01",
-        ),
+        ("robot: {clearance_m: -0.01}", "robot.clearance_m: expected a number of at least 0"),
         ("robot: {overlap: 0.9}", "robot.overlap: expected a number of at most 0.5, got 0.9"),
         ("robot: 3", "robot: expected a mapping, got 3"),
         ("mission: {home: 3}", "expected a mapping such as {x_m: ..., y_m: ...} or null, got 3"),
-        (
-            "mission: {keep_out: [[1, 1], [2, 1], [2, 2]]}",
-            "mission.keep_out: expected a list: write [ ] around it, got [[1, 1], [2, 1], [2, 2]]",
-        ),
+        ("mission: {keep_out: [[1, 1], [2, 1], [2, 2]]}", "mission.keep_out: expected a list:"),
         ("robot: {name: 3}", "robot.name: expected a text, in quotes, got 3"),
-        (
-            "robot: {name: a/b}",
-            "robot.name: must be chunks of letters, digits, '_' and '-', got 'a/b'",
-        ),
+        ("robot: {name: a/b}", "robot.name: must be chunks of letters, digits, '_' and '-'"),
         ("robot: {name: ''}", "got ''"),
         (r'bus: {mode: "\ud800"}', "bus.mode: expected peer, client or router, got"),
-        (
-            "bus: {listen: 'tcp/0.0.0.0:1'}",
-            "bus.listen: expected a list: write [ ] around it, got 'tcp/0.0.0.0:1'",
-        ),
+        ("bus: {listen: 'tcp/0.0.0.0:1'}", "bus.listen: expected a list: write [ ] around it"),
         ("bus: {listen: [7447]}", "bus.listen[0]: expected a text, in quotes, got 7447"),
         ("bus: {listen: []}", "bus.listen: must not be empty if bus.connect is empty"),
-        (
-            "map: {free_at_most: 101}",
-            "map.free_at_most: expected a whole number of at most 100, got 101",
-        ),
-        (
-            "fleet: {name: hall, x_m: 3}",
-            "fleet.frame: expected the name of the frame that fleet.x_m, fleet.y_m and "
-            "fleet.yaw_deg are given in",
-        ),
-        (
-            "fleet: {name: hall, map_frame: floor1}",
-            "fleet.map_frame: expected fleet.frame, too: the name of the fleet's frame, in which "
-            "that map is placed",
-        ),
-        (
-            "map: {free_at_most: 65}",
-            "map.free_at_most: must be below map.occupied_at_least, got 65 and 65",
-        ),
+        ("map: {free_at_most: 101}", "map.free_at_most: expected a whole number of at most 100"),
+        ("fleet: {name: hall, x_m: 3}", "fleet.frame: expected the name of the frame that"),
+        ("fleet: {name: hall, map_frame: floor1}", "fleet.map_frame: expected fleet.frame, too:"),
+        ("map: {free_at_most: 65}", "map.free_at_most: must be below map.occupied_at_least"),
         (
             "pose: {schema: nav_msgs/msg/Path}",
             "pose.schema: expected geometry_msgs/msg/PoseStamped, "
@@ -198,10 +170,7 @@ def test_a_removed_key_without_a_value_is_ignored(load):
             "mission.dock.yaw: unknown key; did you mean mission.dock.yaw_deg?",
         ),
         ("scan: {x: 1}", "scan.x: unknown key; did you mean scan.x_m?"),
-        (
-            "robot: {turn: 1}",
-            "did you mean robot.turn_deg_s or robot.turn_deg_s2 or robot.turn_radius_m?",
-        ),
+        ("robot: {turn: 1}", "did you mean robot.turn_deg_s or robot.turn_deg_s2"),
         (
             "mission: {zones: [{name: a, polygon: [[0, 0], [1, 0], [1, 1]]}, "
             "{name: a, polygon: [[0, 0], [2, 0], [1, 1]]}]}",
@@ -213,11 +182,7 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ("robot: {radius_m: 1, radius_m: 2}", "robot.radius_m: is given twice in line 1"),
         ("robot: {radius_m: 0,2}", "got 2; a number has a decimal point, no comma"),
         ("1: 2", "expected a text as key, got 1"),
-        (
-            "robot:\n  name: [unclosed\nbus: 1",
-            "not plain YAML: line 3, column 4: expected ',' or ']', but got ':', while parsing a "
-            "flow sequence that begins in line 2",
-        ),
+        ("robot:\n  name: [unclosed\nbus: 1", "not plain YAML: line 3, column 4: expected ','"),
         ("robot:\n\tname: x", "line 2, column 1: a tab: indent by spaces"),
         ("robot:\n  name: a\n radius_m: 1", "line 3, column 2: indented differently from"),
         ("robot: {name: a\nbus: {}", "line 2, column 4: expected ',' or '}'"),
@@ -321,7 +286,6 @@ NAMES = {
 
 @st.composite
 def documents(draw: st.DrawFn) -> object:
-    """Draw a document with few mistakes, or with nothing but mistakes."""
     sections = draw(st.lists(st.sampled_from(sorted(NAMES)), max_size=2, unique=True))
     document: dict[object, object] = {
         section: {key: draw(VALUES) for key in draw(st.sets(st.sampled_from(NAMES[section])))}

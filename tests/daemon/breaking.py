@@ -49,7 +49,6 @@ def cells(width_m: float) -> int:
 
 
 def break_stops() -> None:
-    """Have the first empty paths break."""
     put_path, unsent = Outbox._put_path, []
 
     def breaking_put(self: Any, path: Any) -> None:
@@ -62,7 +61,6 @@ def break_stops() -> None:
 
 
 def main() -> None:
-    """Build the faults in and run."""
     if UNSENT in sys.argv:
         sys.argv.remove(UNSENT)
         break_stops()

@@ -27,7 +27,6 @@ def outsider(daemon: Daemon) -> Iterator[Outsider]:
 
 @pytest.fixture
 def written(tmp_path: Path) -> Path:
-    """The folder of a robot that has covered four cells, and has written three and four."""
     file = LedgerFile(tmp_path, "robot")
     for length in (3, 4):
         file.write(lane(length))

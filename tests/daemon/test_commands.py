@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import signal
 from typing import Any
 
 import numpy as np
@@ -13,9 +12,18 @@ import pytest
 
 from fasaco_edge.cli import main
 from tests.daemon.test_mission import about, planned
-from tests.support.outsider import Outsider
-from tests.support.processes import Daemon, daemon_process, fasaco_edge
-from tests.support.rooms import HALL, begin, cells_of, drive, lanes, map_bytes, pose_bytes, room
+from tests.support.outsider import Outsider, joined_daemon
+from tests.support.processes import Daemon, fasaco_edge
+from tests.support.rooms import (
+    HALL,
+    begin,
+    cells_of,
+    drive,
+    lanes,
+    map_bytes,
+    room,
+    show_room,
+)
 
 # Lanes 3 and 4 of the hall, columns 1 to 4.
 KITCHEN = {"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0.3, 1.5]]}
@@ -25,7 +33,6 @@ KITCHEN_CELLS = {(row, col) for row in (3, 4) for col in range(1, 5)}
 def command(
     outsider: Outsider, name: str, order: dict[str, Any] | None = None, *, discard: bool = True
 ) -> dict[str, Any]:
-    """Give a command; return the answer, or the error."""
     asked: dict[str, Any] = {"command": name} | ({"order": order} if order is not None else {})
     if name in ("start", "reset"):
         asked["discard"] = discard
@@ -44,7 +51,6 @@ def ask(outsider: Outsider, payload: bytes | None) -> dict[str, Any]:
 
 
 def told(daemon: Daemon, *words: str) -> Any:
-    """Run ``fasaco-edge mission`` here; it has to succeed. Return its JSON."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = main(["mission", *words, "--connect", daemon.endpoint, "--json"])
@@ -87,10 +93,7 @@ def test_a_question_without_a_payload_is_one_for_the_status(outsider):
 
 
 def test_an_order_before_any_map_and_a_life_after_it(tmp_path):
-    with (
-        daemon_process(tmp_path, mission={"autostart": False}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, mission={"autostart": False}) as (running, outsider):
         paths, taken = outsider.listen("path"), outsider.listen("command", late=False)
         assert outsider.ask_status()["state"] == "idle"
         assert outsider.ask_status()["reason"] == "no order yet: start a mission"
@@ -119,18 +122,13 @@ def test_an_order_before_any_map_and_a_life_after_it(tmp_path):
         assert status["coverage"]["covered"] == 5
         assert status["state"] == "paused"
         # Killed, it still is.
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
+        running.kill()
         order = taken.wait(lambda heard: heard.json()["command"] == "start").json()["order"]
         assert order["zones"][0]["name"] == "kitchen"
         assert [heard.json()["command"] for heard in taken.heard] == ["start", "pause"]
-    with (
-        daemon_process(tmp_path, mission={"autostart": False}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, mission={"autostart": False}) as (_, outsider):
         assert outsider.ask_status()["state"] == "paused"
-        outsider.put("map", map_bytes(room(6.0, 4.5)))
-        outsider.put("pose", pose_bytes(*lanes(5)[-1]))
+        show_room(outsider, room(6.0, 4.5), *lanes(5)[-1])
         status = outsider.wait_status(lambda status: status["pose"] is not None)
         assert status["state"] == "paused"
         assert (status["mission"]["zone"], status["mission"]["pass"]) == ("kitchen", 1)
@@ -153,7 +151,7 @@ def test_an_order_before_any_map_and_a_life_after_it(tmp_path):
 
 
 def test_an_order_ends_at_its_time_limit(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (running, outsider):
         begin(outsider)
         answer = told(running, "start", "--until-min", "0.03", "--yes")
         assert 0.0 < answer["mission"]["time_left_s"] <= 1.8
@@ -166,7 +164,7 @@ def test_an_order_ends_at_its_time_limit(tmp_path):
 def test_a_map_of_dirt_says_what_comes_first_where_time_is_short(tmp_path):
     dirt = np.full(HALL.shape, -1, np.int8)
     dirt[:, HALL.shape[1] // 2 :] = 90
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (running, outsider):
         outsider.put("priority", map_bytes(dirt))
         begin(outsider)
         told(running, "start", "--until-min", "0.7", "--yes")
@@ -181,7 +179,7 @@ def test_a_map_of_dirt_says_what_comes_first_where_time_is_short(tmp_path):
 
 
 def test_reset_keeps_the_ledger_aside(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         begin(outsider)
         drive(outsider, lanes(10))
         answer = command(outsider, "reset")
@@ -193,19 +191,16 @@ def test_reset_keeps_the_ledger_aside(tmp_path):
         outsider.wait_status(lambda status: status["state"] == "covering")
     names = [path.name for path in (tmp_path / "state").iterdir()]
     assert any(name.startswith("robot.ledger.reset-") for name in names), names
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         assert outsider.ask_status()["ledger"]["restored_cells"] == 1
         assert command(outsider, "reset")["state"] == "idle", "before there is a map, too"
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         assert outsider.ask_status()["state"] == "idle"
         assert outsider.ask_status()["ledger"]["restored_cells"] == 0
 
 
 def test_the_command_line(tmp_path):
-    with (
-        daemon_process(tmp_path, mission={"autostart": False}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, mission={"autostart": False}) as (running, outsider):
         assert told(running, "status")["state"] == "idle"
         begin_idle(outsider)
         zone = "kitchen:0.3,0.9;1.5,0.9;1.5,1.5;0.3,1.5"
@@ -247,8 +242,7 @@ def test_the_command_line(tmp_path):
 
 
 def begin_idle(outsider: Outsider) -> None:
-    outsider.put("map", map_bytes(room(6.0, 4.5)))
-    outsider.put("pose", pose_bytes(0.45, 0.45))
+    show_room(outsider, room(6.0, 4.5), 0.45, 0.45)
     outsider.wait_status(lambda status: status["pose"] is not None)
 
 

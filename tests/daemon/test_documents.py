@@ -7,9 +7,9 @@ import subprocess
 import sys
 from contextlib import ExitStack
 
-from tests.support.outsider import Outsider
+from tests.support.outsider import Outsider, joined_daemon
 from tests.support.processes import daemon_process, free_endpoint
-from tests.support.rooms import cells_of, coverable_cells, map_bytes, pose_bytes, room
+from tests.support.rooms import cells_of, coverable_cells, room, show_room
 from tests.wire.contract_files import PROTOCOL, load
 from tests.wire.schemas import check
 
@@ -18,7 +18,6 @@ CLIENT = PROTOCOL / "examples" / "client.py"
 
 
 def say(outsider, name, payload=None):
-    """Ask, and return the document that comes back, checked; None where CDR does."""
     (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/{name}", payload=payload, timeout=60.0)
     answer = reply.ok or reply.err
     if "application/cdr" in str(answer.encoding):
@@ -31,13 +30,12 @@ def say(outsider, name, payload=None):
 
 def test_from_the_first_status_to_the_last_each_is_one(tmp_path):
     """Through a life with all there is: orders, zones, faults, replans, the end."""
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         path, commands = outsider.listen("path"), outsider.listen("command", late=False)
         for name in ("config", "version", "mission", "status", "replan", "path", "pheromone"):
             say(outsider, name)
         outsider.put("pose", b"nonsense")
-        outsider.put("map", map_bytes(room(3.0, 3.0)))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
+        show_room(outsider, room(3.0, 3.0), 0.75, 0.75)
         path.wait(lambda heard: True)
         order = json.dumps({"command": "start", "order": ORDER}).encode()
         assert say(outsider, "mission", order)["mission"]["zones"][0]["name"] == "west"

@@ -52,7 +52,6 @@ def test_a_recorder_that_keeps_dying_starts_less_and_less_often(tmp_path, monkey
         recorder, now, pauses = RecorderSupervisor(config, bus, tmp_path), time.monotonic(), []
 
         def lives_for(seconds):
-            """Let it report once, die, and start again; note how long that took."""
             nonlocal now
             while not (born.exists() and (pid := born.read_text().strip())):
                 time.sleep(0.01)

@@ -14,7 +14,7 @@ from fasaco_edge.bus.session import open_bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.security import BusConfig
 from fasaco_edge.daemon import supervisor
-from tests.support.outsider import Outsider
+from tests.support.outsider import Outsider, joined_daemon
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import fill, map_bytes, odometry_bytes, pose_bytes, room
 
@@ -22,7 +22,6 @@ RECORDING = "recording"
 
 
 def plan_times(outsider, count, first_revision):
-    """Send maps that change something; return for each the seconds until its path came."""
     path = outsider.listen("path")
     outsider.put("pose", pose_bytes(0.75, 0.75))
     seconds = []
@@ -57,8 +56,6 @@ def test_a_frozen_subscriber_does_not_hold_the_planner(daemon, outsider):
 
 
 def wait_recorder(outsider, state, **more):
-    """Return the recorder's part of the first status that says ``state``."""
-
     def holds(status):
         said = status["recorder"] or {}
         return said.get("state") == state and all(said.get(k) == v for k, v in more.items())
@@ -68,10 +65,7 @@ def wait_recorder(outsider, state, **more):
 
 def test_a_killed_recorder_restarts_and_planning_continues(tmp_path):
     pytest.importorskip("rerun")
-    with (
-        daemon_process(tmp_path, "--record", str(tmp_path)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, "--record", str(tmp_path)) as (_, outsider):
         plan_times(outsider, 1, 0)
         first = wait_recorder(outsider, RECORDING)
         assert first["restarts"] == 0

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.host.processes import own_mb
-from tests.support.outsider import Outsider
+from tests.support.outsider import Outsider, joined_daemon
 from tests.support.processes import Daemon, daemon_process, mapped_files
-from tests.support.rooms import map_bytes, pillared_room, pose_bytes
+from tests.support.rooms import pillared_room, pose_bytes, show_room
 
 # Memory of its own at most, without pages of files [MB].
 IDLE_MB = 32.0
@@ -19,14 +19,12 @@ IDLE_MB = 32.0
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """One whose memory is its own."""
     with daemon_process(tmp_path_factory.mktemp("daemon"), executed=True) as running:
         yield running
 
 
 @pytest.fixture(scope="module")
 def waiting(daemon: Daemon) -> Daemon:
-    """A daemon that has said who it is, and has heard no map."""
     with Outsider(daemon.endpoint) as outsider:
         outsider.wait_status(lambda status: status["state"] == "waiting for map")
     return daemon
@@ -34,7 +32,7 @@ def waiting(daemon: Daemon) -> Daemon:
 
 def test_it_is_ready_when_its_token_stands(tmp_path):
     started = time.monotonic()
-    with daemon_process(tmp_path, executed=True) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path, executed=True) as (running, outsider):
         print(f"ready {1e3 * (time.monotonic() - started):.0f} ms after its start")
         assert "ready after" in running.log_text()
         running.stop()
@@ -53,7 +51,6 @@ def test_it_is_small(waiting):
 
 
 def wakes(pid):
-    """How often its main thread has waited for something."""
     lines = Path(f"/proc/{pid}/task/{pid}/status").read_text().splitlines()
     (line,) = (line for line in lines if line.startswith("voluntary_ctxt_switches"))
     return int(line.split()[1])
@@ -87,8 +84,7 @@ def test_a_second_robot_joins_where_one_listens(daemon, tmp_path):
             assert client.alive()
             assert first_client.ask_status()["robot"] == "robot"
             path, other_path = client.listen("path"), first_client.listen("path")
-            client.put("map", map_bytes(pillared_room()))
-            client.put("pose", pose_bytes(1.0, 1.0))
+            show_room(client, pillared_room(), 1.0, 1.0)
             path.wait(lambda heard: len(heard.payload) > 100)
             assert other_path.heard == []
             assert first_client.ask_status()["map"] is None

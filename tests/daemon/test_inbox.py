@@ -48,8 +48,6 @@ UPDATE = update_bytes(pillared_room(), 1.0, 1.0, 2.0, 2.0)
 
 
 class Arrivals:
-    """A mailbox with its inbox; samples come in one after the other."""
-
     def __init__(self, bus):
         self.mailbox = make_mailbox(MAX_PIXELS, map_spacing_s=0.0)
         self.inbox = Inbox(bus, Keys(), self.mailbox, PoseDecoder(POSE_STAMPED, None), MAX_PIXELS)
@@ -61,11 +59,9 @@ class Arrivals:
         self.mailbox.post(kind, Received(kind, sample, self.clock))
 
     def events(self):
-        """Return the events, and the faults."""
         return self.inbox.decode(take_batch(self.mailbox, 0.0))
 
     def decode(self):
-        """Return the types of the events, and the faults."""
         events, faults = self.events()
         return [type(event) for event in events], faults
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import signal
 from typing import Any
 
 from tests.daemon.test_commands import ask, command
 from tests.daemon.test_mission import about, planned
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
+from tests.support.outsider import Outsider, joined_daemon
 from tests.support.rooms import begin, cells_of, drive, lanes
 from tests.wire.schemas import check
 
@@ -25,7 +23,7 @@ def keep_out(outsider: Outsider, action: str, area: dict[str, Any]) -> dict[str,
 
 
 def test_a_keep_out_in_mid_mission_keeps_coverage_and_is_avoided(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         paths, taken = outsider.listen("path"), outsider.listen("command", late=False)
         begin(outsider)
         covered = drive(outsider, lanes(12))["coverage"]["covered"]
@@ -48,28 +46,26 @@ def test_a_keep_out_in_mid_mission_keeps_coverage_and_is_avoided(tmp_path):
 
 
 def test_it_outlives_a_kill_and_comes_before_any_map(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (running, outsider):
         assert keep_out(outsider, "add", VASE)["state"] == "waiting for map"
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        running.kill()
+    with joined_daemon(tmp_path) as (running, outsider):
         paths = outsider.listen("path")
         assert outsider.ask_status()["mission"]["keep_outs"] == [{**VASE, "by": "operator"}]
         begin(outsider)
         heard = paths.wait(lambda heard: len(planned(heard)[0]) > 0)
         assert not set(cells_of(planned(heard)[0])) & AROUND
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
+        running.kill()
     # Without a map, too, it can be removed.
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         assert keep_out(outsider, "remove", {"name": "vase"})["mission"]["keep_outs"] == []
 
 
 def test_a_keep_out_before_a_map_forgets_nothing_in_the_ledger(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         begin(outsider)
         drive(outsider, lanes(12))
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         for name, order in (("start", {"passes": 2}), ("reset", None)):
             error = command(outsider, name, order, discard=False)
             assert error["code"] == "would_forget"

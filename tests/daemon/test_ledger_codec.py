@@ -37,7 +37,6 @@ def trail_of(*values: float) -> TrailSnapshot:
 
 
 def all_of(ledger: LedgerSnapshot) -> object:
-    """Return all that a ledger holds, its trail to the last bit."""
     return contents(ledger), ledger.trail.window, ledger.trail.tau.tobytes()
 
 

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import os
-import signal
 import time
 from pathlib import Path
 
 from fasaco_edge.daemon.ledger.disk_writer import RETRY_S
 from tests.support.disks import disk_fixture
-from tests.support.outsider import Outsider
-from tests.support.processes import STOP_S, Daemon, daemon_process
+from tests.support.outsider import Outsider, joined_daemon
+from tests.support.processes import STOP_S, Daemon
 from tests.support.rooms import begin, drive, lanes, wait_written
 
 small_disk = disk_fixture("256k")
 
 
 def fill(ballast: Path) -> None:
-    """Fill the disk to the last byte."""
     with ballast.open("wb", buffering=0) as file:
         try:
             while file.write(bytes(4096)):
@@ -27,7 +25,6 @@ def fill(ballast: Path) -> None:
 
 
 def check_trouble(running: Daemon, outsider: Outsider, said: str) -> None:
-    """Drive on while nothing can be written; check what is said, and that nothing stands still."""
     drive(outsider, lanes(40)[20:])
     status = outsider.wait_status(lambda status: status["ledger"]["fault"] is not None)
     assert said in status["ledger"]["fault"]
@@ -46,10 +43,7 @@ def check_trouble(running: Daemon, outsider: Outsider, said: str) -> None:
 
 def test_a_full_disk_is_reported_and_loses_nothing(tmp_path, small_disk):
     ballast = small_disk / "ballast"
-    with (
-        daemon_process(tmp_path, "--state", str(small_disk)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, "--state", str(small_disk)) as (running, outsider):
         begin(outsider)
         drive(outsider, lanes(20))
         wait_written(outsider)
@@ -57,19 +51,15 @@ def test_a_full_disk_is_reported_and_loses_nothing(tmp_path, small_disk):
         check_trouble(running, outsider, "No space left on device")
         ballast.unlink()
         outsider.wait_status(lambda status: status["ledger"]["fault"] is None)
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
-    with (
-        daemon_process(tmp_path, "--state", str(small_disk)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+        running.kill()
+    with joined_daemon(tmp_path, "--state", str(small_disk)) as (_, outsider):
         status = outsider.ask_status()
         assert (status["ledger"]["restored_cells"], status["ledger"]["fault"]) == (60, None)
 
 
 def test_a_hanging_disk_delays_neither_mission_nor_shutdown(tmp_path):
     """Who opens a pipe to write waits for a reader, as for a disk that does not answer."""
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (running, outsider):
         os.mkfifo(tmp_path / "state" / "robot.ledger.new")
         begin(outsider)
         status = drive(outsider, lanes(30))

@@ -13,17 +13,15 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from tests.daemon.test_mission import START, planned
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
+from tests.support.outsider import joined_daemon
 from tests.support.rooms import (
     RADIUS_M,
     RESOLUTION_M,
     TOOL_M,
     coverable_cells,
     drive,
-    map_bytes,
     pillared_room,
-    pose_bytes,
+    show_room,
 )
 
 ROBOT = SweepingRobot(TOOL_M, RADIUS_M, 0.25, 1.5)
@@ -39,13 +37,9 @@ def swept_by(pixels, points):
 def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
     pixels = pillared_room()
     by_default = DaemonConfig().planner.line
-    with (
-        daemon_process(tmp_path, planner={"line": by_default}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, planner={"line": by_default}) as (_, outsider):
         receiver = outsider.listen("path")
-        outsider.put("map", map_bytes(pixels))
-        outsider.put("pose", pose_bytes(*START))
+        show_room(outsider, pixels, *START)
         points, _ = planned(receiver.wait(lambda heard: True))
         figures = swept_by(pixels, points)
         assert figures.illegal_share == 0.0
@@ -70,13 +64,9 @@ def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
 
 def test_cells_at_an_angle_are_published_in_the_map_frame(tmp_path):
     pixels = pillared_room()
-    with (
-        daemon_process(tmp_path, planner={"line": "thorough", "align": 30}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, planner={"line": "thorough", "align": 30}) as (_, outsider):
         paths, grids = outsider.listen("path"), outsider.listen("coverage")
-        outsider.put("map", map_bytes(pixels))
-        outsider.put("pose", pose_bytes(*START))
+        show_room(outsider, pixels, *START)
         points, _ = planned(paths.wait(lambda heard: True))
         figures = swept_by(pixels, points)
         assert figures.illegal_share == 0.0

@@ -18,9 +18,19 @@ from fasaco_edge.errors import BadConfiguration
 from tests.daemon.test_mission import planned
 from tests.daemon.test_reload import taken_by
 from tests.daemon.test_ros2 import BRIDGE, RMW, ros2
-from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.outsider import TIMEOUT_S, Outsider, joined_daemon
 from tests.support.processes import daemon_process
-from tests.support.rooms import FREE, WALL, cells_of, fill, lanes, map_bytes, pose_bytes, room
+from tests.support.rooms import (
+    FREE,
+    WALL,
+    cells_of,
+    fill,
+    lanes,
+    map_bytes,
+    pose_bytes,
+    room,
+    show_room,
+)
 from tests.support.ros_robot import GRID, ros_robot
 from tests.wire import oracle
 
@@ -37,13 +47,10 @@ def put_mask(outsider, pixels, **keys):
 
 
 def give(outsider):
-    """Give map and pose, without waiting for a path."""
-    outsider.put("map", map_bytes(ROOM))
-    outsider.put("pose", pose_bytes(*lanes(1)[0]))
+    show_room(outsider, ROOM, *lanes(1)[0])
 
 
 def cells_in(frame, heard):
-    """Return the cells of a path in a frame; none of one in another."""
     message = oracle.from_bytes("nav_msgs/msg/Path", heard.payload)
     places = [(stamped.pose.position.x, stamped.pose.position.y) for stamped in message.poses]
     return set(cells_of(np.array(places))) if message.header.frame_id == frame and places else set()
@@ -54,10 +61,7 @@ def driven(heard):
 
 
 def test_there_is_no_mission_before_the_mask_has_come(tmp_path):
-    with (
-        daemon_process(tmp_path, mission=dict(MISSION)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, mission=dict(MISSION)) as (_, outsider):
         paths = outsider.listen("path")
         give(outsider)
         status = outsider.wait_status(lambda status: "mask" in status["reason"])
@@ -75,10 +79,7 @@ def test_there_is_no_mission_before_the_mask_has_come(tmp_path):
 
 
 def test_an_unreadable_mask_leaves_the_last_one_in_force(tmp_path):
-    with (
-        daemon_process(tmp_path, mission=dict(MISSION)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, mission=dict(MISSION)) as (_, outsider):
         # It may come before the map.
         put_mask(outsider, MASK)
         give(outsider)
@@ -112,10 +113,7 @@ def test_navs_mask_is_taken_however_early_it_was_published(naming, tmp_path):
 
 def test_a_mask_in_another_frame_waits_for_a_map_in_that_frame(tmp_path):
     """Published once, it would not come again; one of another map keeps out of other places."""
-    with (
-        daemon_process(tmp_path, mission=dict(MISSION)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, mission=dict(MISSION)) as (_, outsider):
         put_mask(outsider, BLANK)
         give(outsider)
         outsider.wait_status(lambda status: status["state"] == "covering")
@@ -134,8 +132,6 @@ def test_a_mask_in_another_frame_waits_for_a_map_in_that_frame(tmp_path):
 
 
 class Mask:
-    """A mask that has come, and what is wrong with it."""
-
     def __init__(self, *faults):
         self.has_change = True
         self.faults = list(faults)

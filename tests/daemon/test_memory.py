@@ -18,7 +18,6 @@ from fasaco_edge.daemon.memory import (
     LEAST_MASK_BYTES,
     LEAST_PIXELS,
     MASK_COPIES,
-    MB,
     MIB,
     PILLOW_BYTES,
     SPARE,
@@ -76,7 +75,7 @@ def test_the_guides_say_the_formula():
         assert formula in guide
     assert f"MemoryMax={limits_mib(DEFAULT)[1]}M" in guide
     reads = f"{MASK_COPIES} x map.max_pixels - {PILLOW_BYTES:,}"
-    assert f"{reads} bytes ({mask_bytes(DEFAULT, None) // MB} MB)" in guide
+    assert f"{reads} bytes ({mask_bytes(DEFAULT, None) // 1_000_000} MB)" in guide
     contract = " ".join(CONTRACT.split())
     maps = DEFAULT.map
     assert f"`map.max_pixels` pixels ({maps.max_pixels:,}" in contract

@@ -8,8 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
+from tests.support.outsider import Outsider, joined_daemon
 from tests.support.rooms import (
     FREE,
     RADIUS_M,
@@ -43,7 +42,6 @@ def about(heard):
 
 
 def covers(heard, pixels):
-    """Tell whether a path visits exactly the cells where the robot fits."""
     points, _ = planned(heard)
     return len(points) > 0 and set(cells_of(points)) == coverable_cells(pixels)
 
@@ -55,7 +53,6 @@ def pixels():
 
 @pytest.fixture(scope="module")
 def path(daemon, pixels):
-    """The path of the room with the pillar."""
     with Outsider(daemon.endpoint) as outsider:
         receiver = outsider.listen("path")
         outsider.put("map", map_bytes(pixels, stamp_ns=12_000_000_034))
@@ -67,7 +64,7 @@ def path(daemon, pixels):
 
 
 def test_without_a_map_the_path_is_empty_and_coverage_an_error(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         begins = outsider.listen("path", begins=True).wait(lambda heard: True)
         assert about(begins)["revision"] == 0
         assert len(planned(begins)[0]) == 0
@@ -246,8 +243,7 @@ def test_the_status_comes_once_a_second(path, outsider):
 
 @pytest.fixture
 def fresh(tmp_path):
-    """An outsider of a daemon of its own."""
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+    with joined_daemon(tmp_path) as (_, client):
         yield client
 
 

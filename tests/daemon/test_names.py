@@ -20,7 +20,7 @@ from fasaco_edge.doctor import session
 from fasaco_edge.doctor.finding import CheckContext, Level
 from fasaco_edge.host.processes import peak_mb
 from tests.campaigns.memory import Flood, map_payload, update_payload
-from tests.support.outsider import Collector, Outsider
+from tests.support.outsider import Collector, Outsider, joined_daemon
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.router import router_process
@@ -31,8 +31,6 @@ ROOM = room(4.0, 3.0)
 
 
 class Robot:
-    """A mapper, and subscriptions, beside the router."""
-
     def __init__(self, endpoint):
         config = {
             "mode": "client",
@@ -53,13 +51,10 @@ class Robot:
         self.session.put(f"{PREFIX}/pose", pose_bytes(0.75, 0.75))
 
     def claims(self):
-        """The daemons there are, by id."""
         replies = self.session.liveliness().get(f"{PREFIX}/claim/*/*", timeout=2.0)
         return claims_in(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
 
     def wait_claims(self, planning, waiting=0):
-        """Wait until so many daemons plan, and so many do not; return them."""
-
         def holds():
             claims = self.claims()
             plan = list(claims.values()).count(ClaimState.PLANS)
@@ -68,8 +63,6 @@ class Robot:
         return until(holds)
 
     def wait_path(self, since=0):
-        """Give map and pose until somebody answers with a path of some steps."""
-
         def holds():
             self.tell()
             time.sleep(0.2)
@@ -84,7 +77,6 @@ def attached(path):
 
 @contextmanager
 def two_daemons(folder, *endpoints, **sections):
-    """Two of one name, begun at the same moment, each with a state of its own."""
     with ExitStack() as stack:
         daemons = []
         for number, endpoint in enumerate(endpoints):
@@ -224,10 +216,7 @@ def test_a_waiting_daemon_keeps_only_its_newest_maps(tmp_path):
     maps = {"max_pixels": side * side, "max_lattice_cells": 50_000}
     flood = Flood("updates", side, 0.05, 20.0)
     config = {"map": maps, "robot": {"tool_width_m": 1.0, "radius_m": 0.5}}
-    with (
-        daemon_process(tmp_path, executed=True, **config) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, executed=True, **config) as (running, outsider):
         claim = f"{PREFIX}/claim/0/plans"
         token = outsider.session.liveliness().declare_token(claim)
         outsider.wait_status(lambda status: status["state"] == "blocked")

@@ -16,7 +16,6 @@ from fasaco_edge.daemon.notify import ServiceManager
 
 @pytest.fixture(params=["path", "abstract"])
 def listening(request, tmp_path) -> Iterator[tuple[socket.socket, str]]:
-    """A socket with its name, as $NOTIFY_SOCKET has it."""
     name = str(tmp_path / "notify") if request.param == "path" else f"@fasaco-test-{os.getpid()}"
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
         heard.bind(name.replace("@", "\0", 1) if name.startswith("@") else name)

@@ -31,8 +31,6 @@ from tests.mission.test_room_orders import BOTH, IN_EAST, room_at, settled, star
 
 
 class Sent:
-    """An outbox with or without listeners: what was sent, and what is kept for queries."""
-
     def __init__(self, *, is_heard=True):
         self.messages, self.kept, self.is_heard = [], [], is_heard
 
@@ -132,7 +130,6 @@ def two_rooms():
 
 
 def rooms_of(robot):
-    """Return the rooms as they would be published now, the western one first."""
     sent = Sent()
     RoomsPublisher(sent, robot.mission.rooms).publish(robot.mission, robot.now)
     return decode_document(sent.messages[-1][1], Rooms).rooms

@@ -18,9 +18,8 @@ from fasaco_edge.daemon.loop.answers import LEFT_OUT, config_document
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from fasaco_edge.wire.query_table import RPC_NAMES
 from tests.daemon.test_mission import about, covers, planned
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
-from tests.support.rooms import map_bytes, pillared_room, pose_bytes
+from tests.support.outsider import Outsider, joined_daemon
+from tests.support.rooms import pillared_room, pose_bytes, show_room
 from tests.support.waiting import until
 
 ANTS = {"name": "fasaco", "ants": 24, "velocities": "8,4,1", "budget_s": 2.0}
@@ -31,7 +30,6 @@ def get(outsider: Outsider, name: str, payload: bytes | None = None) -> list[zen
 
 
 def error(outsider: Outsider, name: str, payload: bytes | None = None) -> dict[str, Any]:
-    """Return the one answer, which has to be an error with its three members."""
     (reply,) = get(outsider, name, payload)
     assert reply.ok is None, reply.ok.payload.to_bytes()
     assert str(reply.err.encoding) == "application/json"
@@ -43,15 +41,13 @@ def error(outsider: Outsider, name: str, payload: bytes | None = None) -> dict[s
 
 @pytest.fixture(scope="module")
 def covering(tmp_path_factory):
-    """A daemon that has planned for a room, without local search."""
     folder = tmp_path_factory.mktemp("covering")
-    with daemon_process(folder, planner=ANTS) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(folder, planner=ANTS) as (_, outsider):
         for name in ("coverage", "pheromone"):
             assert error(outsider, f"@rpc/{name}")["code"] == "not_yet"
         assert error(outsider, "@rpc/replan")["code"] == "not_now"
         path = outsider.listen("path")
-        outsider.put("map", map_bytes(pillared_room()))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
+        show_room(outsider, pillared_room(), 0.75, 0.75)
         path.wait(lambda heard: covers(heard, pillared_room()))
         outsider.wait_status(lambda status: status["plan"]["plans"] == 1)
         yield outsider
@@ -149,13 +145,9 @@ def test_a_full_plan_is_made_when_asked_for_but_not_all_the_time(covering):
 
 
 def test_a_requested_path_has_that_reason(tmp_path):
-    with (
-        daemon_process(tmp_path, planner={"budget_s": 0.05}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, planner={"budget_s": 0.05}) as (_, outsider):
         path = outsider.listen("path")
-        outsider.put("map", map_bytes(pillared_room()))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
+        show_room(outsider, pillared_room(), 0.75, 0.75)
         path.wait(lambda heard: True)
         # Elsewhere the walk has another beginning.
         outsider.put("pose", pose_bytes(0.75, 1.05))

@@ -36,7 +36,6 @@ def reloaded(written: DaemonConfig) -> DaemonConfig:
 
 
 def taken_by(reload: Reload) -> tuple[DaemonConfig, list[BadConfiguration]]:
-    """Return what is taken, and what is refused, once it is read."""
     ended = threading.Event()
     reload.begin(RUNNING, ended.set)
     assert reload.is_reading

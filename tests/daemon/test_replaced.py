@@ -13,7 +13,7 @@ from fasaco_edge.host.processes import own_mb
 from tests.daemon.test_mask_topic import MISSION, put_mask
 from tests.daemon.test_service import rewritten, service
 from tests.support.outsider import Outsider
-from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
+from tests.support.rooms import FREE, WALL, fill, room, show_room
 from tests.support.waiting import until
 
 # Number of replacements until all caches are full, and of measured ones after that.
@@ -36,7 +36,6 @@ class Held:
 
 
 def held_by(pid: int) -> Held:
-    """Count what a process holds, also children that it has not waited for."""
     process = Path(f"/proc/{pid}")
     threads = list((process / "task").iterdir())
     children = (thread / "children" for thread in threads)
@@ -56,8 +55,6 @@ def squares() -> Iterator[tuple[float, float, float, float]]:
 
 
 def wait_replaced(outsider: Outsider, config: Callable[[dict], bool]) -> None:
-    """Wait until a mission with this configuration has planned."""
-
     def holds() -> bool:
         status = outsider.ask_status()
         return config(status["config"]["mission"]) and status["state"] == "covering"
@@ -66,7 +63,6 @@ def wait_replaced(outsider: Outsider, config: Callable[[dict], bool]) -> None:
 
 
 def reload(running, outsider, square):
-    """Read another keep-out zone from the file."""
     west, south, east, north = square
     corners = [[west, south], [east, south], [east, north], [west, north]]
     rewritten(running, mission={"keep_out": [corners]})
@@ -74,7 +70,6 @@ def reload(running, outsider, square):
 
 
 def send_mask(running, outsider, square):
-    """Publish another keep-out mask."""
     before = outsider.ask_status()["config"]["mission"]["keep_out_mask"]
     put_mask(outsider, fill(BLANK, *square, WALL))
     wait_replaced(outsider, lambda mission: mission["keep_out_mask"] not in ("", before))
@@ -87,8 +82,7 @@ def test_a_replaced_mission_releases_its_memory(tmp_path, replace):
         service(tmp_path, mission=mission, executed=True) as (running, _),
         Outsider(running.endpoint) as outsider,
     ):
-        outsider.put("map", map_bytes(ROOM))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
+        show_room(outsider, ROOM, 0.75, 0.75)
         if replace is send_mask:
             put_mask(outsider, BLANK)
         outsider.wait_status(lambda status: status["state"] == "covering")
@@ -106,7 +100,6 @@ def test_a_replaced_mission_releases_its_memory(tmp_path, replace):
 
 
 def kept(before: Held, after: Held) -> list[str]:
-    """Return what has grown since, of each kind."""
     most = Held(
         children=0,
         threads=before.threads + 2,  # Zenoh starts and ends some of its own

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import shutil
-import signal
 import time
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from fasaco_edge.daemon.ledger.writer import PERIOD_S
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage, decode_pheromone
 from tests.campaigns.kill_daemon import MOST_LOST_S, run_campaign
 from tests.support.ledgers import CELL_M
-from tests.support.outsider import Outsider
+from tests.support.outsider import Outsider, joined_daemon
 from tests.support.processes import daemon_process
 from tests.support.rooms import (
     HALL,
@@ -38,9 +37,8 @@ COVERED = 100
 
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What a daemon left whose robot has covered a part of the hall."""
     folder = tmp_path_factory.mktemp("ended")
-    with daemon_process(folder) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(folder) as (_, outsider):
         begin(outsider)
         assert drive(outsider, lanes(COVERED))["coverage"]["covered"] == COVERED
     return folder / "state"
@@ -48,7 +46,6 @@ def ended(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def covered(ended: Path, tmp_path: Path) -> Path:
-    """A folder with a copy of that."""
     shutil.copytree(ended, tmp_path / "state")
     return tmp_path
 
@@ -58,7 +55,6 @@ def state_files(folder: Path) -> list[str]:
 
 
 def wait_cells(folder: Path, cells: int) -> None:
-    """Wait until so many cells are on the disk; a daemon may be writing them just now."""
     newest, written = folder / "state" / "robot.ledger", 0
     while written < cells:
         time.sleep(0.05)
@@ -76,7 +72,7 @@ def test_a_daemon_killed_at_random_moments_continues(tmp_path):
 
 def test_it_continues_where_sigterm_ended_it(covered):
     """SIGTERM loses nothing at all."""
-    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(covered) as (running, outsider):
         status = outsider.ask_status()
         assert status["state"] == "waiting for map"
         assert status["ledger"] == {
@@ -105,15 +101,14 @@ def trail_of(outsider: Outsider) -> tuple[PheromoneMessage, int]:
 
 
 def test_the_trail_survives_a_kill(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (running, outsider):
         begin(outsider)
         drive(outsider, lanes(30))
         wait_cells(tmp_path, 30)
         time.sleep(2 * PERIOD_S)  # it is written once more, and told
         told, _ = trail_of(outsider)
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        running.kill()
+    with joined_daemon(tmp_path) as (_, outsider):
         # Before it knows where the robot is there is no path to strengthen it.
         outsider.put("map", map_bytes(HALL))
         again, revision = trail_of(outsider)
@@ -125,7 +120,7 @@ def test_the_trail_survives_a_kill(tmp_path):
 
 
 def test_a_fresh_start_covers_everything_and_throws_nothing_away(covered):
-    with daemon_process(covered, "--fresh") as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(covered, "--fresh") as (_, outsider):
         status = begin(outsider)
         assert status["ledger"]["restored_cells"] == 0
         assert status["ledger"]["fault"] is None
@@ -135,18 +130,18 @@ def test_a_fresh_start_covers_everything_and_throws_nothing_away(covered):
 
 def test_another_tool_width_keeps_the_swept_floor(covered):
     robot = {"tool_width_m": 0.25}
-    with daemon_process(covered, robot=robot) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(covered, robot=robot) as (_, outsider):
         status = begin(outsider)
         assert status["errors"]["total"] == 0
         assert status["ledger"]["fault"] is None
         # The same floor in more cells.
         assert status["coverage"]["covered"] > COVERED
-    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(covered) as (_, outsider):
         assert begin(outsider)["coverage"]["covered"] >= COVERED - 1
 
 
 def test_another_building_is_reported_and_covered_from_zero(covered):
-    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(covered) as (_, outsider):
         outsider.put("pose", pose_bytes(0.45, 0.45))
         outsider.put("map", map_bytes(pillars()))
         outsider.wait_status(lambda status: status["state"] == "covering")
@@ -161,12 +156,12 @@ def test_another_building_is_reported_and_covered_from_zero(covered):
         assert status["coverage"]["covered"] == 1
         wait_written(outsider)
     assert [name for name in state_files(covered) if ".mismatch-" in name]
-    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(covered) as (_, outsider):
         assert outsider.ask_status()["ledger"]["restored_cells"] == 1
 
 
 def test_a_second_daemon_for_the_robot_is_refused(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (_, outsider):
         outsider.ask_status()
         with daemon_process(tmp_path) as second:
             assert second.process.wait(120) == 1

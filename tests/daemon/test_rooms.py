@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import signal
 from typing import Any
 
 import pytest
@@ -13,9 +12,9 @@ import pytest
 from fasaco_edge.cli import main
 from tests.daemon.test_commands import ask, command
 from tests.daemon.test_mission import about, planned
-from tests.support.outsider import Outsider
-from tests.support.processes import Daemon, daemon_process
-from tests.support.rooms import cells_of, map_bytes, pose_bytes, two_rooms
+from tests.support.outsider import Outsider, joined_daemon
+from tests.support.processes import Daemon
+from tests.support.rooms import cells_of, show_room, two_rooms
 from tests.wire.schemas import check
 
 FLAT = two_rooms(door=True)
@@ -24,8 +23,7 @@ IDLE: dict[str, Any] = {"mission": {"autostart": False}}
 
 
 def show(outsider: Outsider) -> None:
-    outsider.put("map", map_bytes(FLAT))
-    outsider.put("pose", pose_bytes(*IN_WEST))
+    show_room(outsider, FLAT, *IN_WEST)
 
 
 def room_command(outsider: Outsider, name: str, /, **room: Any) -> dict[str, Any]:
@@ -54,7 +52,7 @@ def test_rooms_are_named_ordered_and_known_again(tmp_path):
     broken = tmp_path / "state" / "robot.rooms.json"
     broken.parent.mkdir()
     broken.write_text("{}")
-    with daemon_process(tmp_path, **IDLE) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path, **IDLE) as (running, outsider):
         heard = outsider.listen("rooms")
         heard.wait(lambda sample: True)
         status = outsider.wait_status(lambda status: status["errors"]["total"])
@@ -87,9 +85,8 @@ def test_rooms_are_named_ordered_and_known_again(tmp_path):
         answer = command(outsider, "start", attic | {"unknown": "wait"})
         assert answer["mission"]["waits_for_room"] == "attic"
         outsider.wait_status(lambda status: "waits for a room 'attic'" in status["reason"])
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
-    with daemon_process(tmp_path, **IDLE) as running, Outsider(running.endpoint) as outsider:
+        running.kill()
+    with joined_daemon(tmp_path, **IDLE) as (_, outsider):
         heard, paths = outsider.listen("rooms"), outsider.listen("path")
         # Before any map the rooms are known, and can be ordered.
         again = heard.wait(lambda sample: sample.json()["rooms"]).json()

@@ -30,7 +30,6 @@ from fasaco_edge.planners.passes import Pass
 
 
 def found():
-    """Two rooms side by side, the first one wider."""
     labels = np.ones((30, 60), np.int32)
     labels[:, 40:] = 2
     return FoundRooms(GridGeometry(*labels.shape, 0.1, Pose2D(-2.0, 1.0)), labels, 2)
@@ -44,7 +43,6 @@ def two_rooms(frame="map"):
 
 
 def full():
-    """Rooms of two frames, with everything that they can have."""
     book = two_rooms("downstairs")
     for _ in range(HOLD_CHANGE):
         update(book, found(), "map")

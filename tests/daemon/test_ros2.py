@@ -48,7 +48,6 @@ def ros2(naming: Naming, **keys):
 
 @contextmanager
 def ros_graph(folder, naming, executed=False):
-    """Run a daemon with ROS keys; yield it and a robot, once the daemon is ready."""
     with (
         daemon_process(folder, executed=executed, ros2=ros2(naming)) as running,
         ros_robot(running.endpoint, naming) as robot,

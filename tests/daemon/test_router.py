@@ -23,7 +23,6 @@ PATIENT = {"retry": {"period_init_ms": 200, "period_max_ms": 1000}}
 
 
 def member(endpoint, connect):
-    """Open a client's session as Zenoh's defaults have it, but for what ``connect`` says."""
     config = {"mode": "client", "connect": {"endpoints": [endpoint], **connect}}
     return zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
 
@@ -66,7 +65,6 @@ class _Heard:
         session.liveliness().declare_subscriber(f"{PREFIX}/alive", self._note, history=True)
 
     def wait_all(self, losses):
-        """Wait until all comes anew; return for each the seconds it took."""
         since = {name: len(receiver.heard) for name, receiver in self._subscriptions.items()}
         missing = {
             "path": lambda: self._is_new("path", since),
@@ -85,7 +83,6 @@ class _Heard:
         return took
 
     def _note(self, token):
-        """Note whether the daemon is there now."""
         self.tokens.append(token.kind == zenoh.SampleKind.PUT)
 
     def _is_new(self, name, since):
@@ -96,7 +93,6 @@ class _Heard:
         return any(reply.ok is not None for reply in replies)
 
     def _publish(self):
-        """Publish a map that changes: each leads to another path."""
         self._maps += 1
         pixels = fill(room(3.0, 3.0), 1.5, 0.0, 1.6, 0.5 + 0.3 * (self._maps % 4), WALL)
         for name, payload in (("map", map_bytes(pixels)), ("pose", pose_bytes(0.75, 0.75))):

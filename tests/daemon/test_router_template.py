@@ -28,7 +28,6 @@ def ca(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def endpoint(ca, tmp_path_factory):
-    """Where the router listens, and two daemons connect to."""
     listens = free_endpoint().replace("tcp/", "tls/")
     text = (folder("protocol") / "config" / "router.json5").read_text()
     text = text.replace("/etc/fasaco-edge", str(ca.folder)).replace("tls/0.0.0.0:7447", listens)
@@ -46,14 +45,12 @@ def endpoint(ca, tmp_path_factory):
 
 @pytest.fixture
 def sender(ca, endpoint):
-    """Open sessions by name."""
     with contextlib.ExitStack() as stack:
         yield lambda name: stack.enter_context(open_client(endpoint, transport(ca.files(name))))
 
 
 @pytest.fixture
 def office(ca, endpoint):
-    """The operator, at each robot's keys."""
     with contextlib.ExitStack() as stack:
         seats = [Outsider(endpoint, name, transport(ca.files("office"))) for name in FLEET]
         yield [stack.enter_context(seat) for seat in seats]

@@ -28,7 +28,6 @@ SILENCE_S = 0.5
 
 @pytest.fixture(scope="module")
 def house(tmp_path_factory):
-    """A daemon behind mutual TLS, on its way."""
     with secured_daemon(tmp_path_factory.mktemp("house")) as running:
         begin(running)
         yield running
@@ -53,7 +52,6 @@ def mission(status):
 
 @pytest.fixture
 def unharmed(boss):
-    """The mission is afterwards as it was before."""
     before = boss.ask_status()
     yield
     time.sleep(SILENCE_S)
@@ -72,7 +70,6 @@ def test_a_mapper_may_publish_and_a_viewer_may_view(house, boss):
 
 @pytest.fixture
 def senders(house):
-    """Open a session for each of some names."""
     with contextlib.ExitStack() as stack:
         yield lambda names: [stack.enter_context(house.sender(name)) for name in names]
 

@@ -15,7 +15,7 @@ from PIL import Image
 
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process
-from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes, show_room, two_rooms
 from tests.support.service_manager import Manager
 
 WATCHDOG_S = 1.0
@@ -23,7 +23,6 @@ WATCHDOG_S = 1.0
 
 @contextmanager
 def service(folder: Path, *, env=None, **sections) -> Iterator[tuple[Daemon, Manager]]:
-    """A daemon with a service manager, once it is ready."""
     manager = Manager(folder)
     told = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": str(int(1e6 * WATCHDOG_S))}
     try:
@@ -38,8 +37,7 @@ def test_ready_means_a_token_and_compiled_kernels(tmp_path):
     with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
         assert outsider.alive()
         path = outsider.listen("path")
-        outsider.put("map", map_bytes(pillared_room()))
-        outsider.put("pose", pose_bytes(1.0, 1.0))
+        show_room(outsider, pillared_room(), 1.0, 1.0)
         path.wait(lambda heard: len(heard.payload) > 100)
         manager.wait("STATUS=covering")
         running.stop()
@@ -62,7 +60,6 @@ def test_the_watchdog_is_fed_until_the_process_stands_still(tmp_path):
 
 
 def rewritten(running: Daemon, **sections) -> None:
-    """Change some sections of its configuration, and tell it."""
     (file,) = running.log.parent.glob("daemon0.yaml")
     before = yaml.safe_load(file.read_text())
     after = {**before, **{k: before.get(k, {}) | v for k, v in sections.items()}}
@@ -80,8 +77,7 @@ def test_a_reload_is_announced_takes_effect_and_keeps_troubles(tmp_path):
         def since_s(status):
             return sum(one["since_s"] for one in status["troubles"] if one["code"] == "no_pose")
 
-        outsider.put("map", map_bytes(pillared_room()))
-        outsider.put("pose", pose_bytes(1.0, 1.0))
+        show_room(outsider, pillared_room(), 1.0, 1.0)
         before = outsider.wait_status(lambda status: since_s(status) > 1.0)
         rewritten(running, planner={"seed": 7})
         assert "\nMONOTONIC_USEC=" in manager.wait("RELOADING=1")
@@ -102,8 +98,7 @@ def test_a_large_mask_is_read_beside_the_loop(tmp_path):
     text = "image: mask.png\nresolution: 0.05\norigin: [0, 50, 0]\nnegate: 0\n"
     (tmp_path / "mask.yaml").write_text(text)
     with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
-        outsider.put("map", map_bytes(pillared_room()))
-        outsider.put("pose", pose_bytes(1.0, 1.0))
+        show_room(outsider, pillared_room(), 1.0, 1.0)
         outsider.wait_status(lambda status: status["path"])
         rewritten(running, mission={"keep_out_mask": "mask.yaml"})
         manager.wait("RELOADING=1")
@@ -124,8 +119,7 @@ def test_a_large_mask_is_read_beside_the_loop(tmp_path):
 
 def test_a_wrong_file_changes_nothing(tmp_path):
     with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
-        outsider.put("map", map_bytes(pillared_room()))
-        outsider.put("pose", pose_bytes(1.0, 1.0))
+        show_room(outsider, pillared_room(), 1.0, 1.0)
         outsider.wait_status(lambda status: status["path"])
         before = outsider.ask("@rpc/config").json()
         rewritten(running, planner={"ants": "many"})

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
-from tests.support.rooms import WALL, fill, map_bytes, pose_bytes, room
+from tests.support.outsider import joined_daemon
+from tests.support.rooms import WALL, fill, map_bytes, room, show_room
 
 
 def large_room(pillars: int) -> np.ndarray:
@@ -21,9 +20,8 @@ def large_room(pillars: int) -> np.ndarray:
 
 def test_a_hasty_plan_is_made_better_and_a_new_map_comes_first(tmp_path):
     hasty = {"budget_s": 0.002, "spare_share": 1.0}
-    with daemon_process(tmp_path, planner=hasty) as running, Outsider(running.endpoint) as outsider:
-        outsider.put("map", map_bytes(large_room(40)))
-        outsider.put("pose", pose_bytes(1.05, 1.05))
+    with joined_daemon(tmp_path, planner=hasty) as (_, outsider):
+        show_room(outsider, large_room(40), 1.05, 1.05)
         first = outsider.wait_status(lambda status: status["path"])
         better = outsider.wait_status(
             lambda status: (

@@ -35,7 +35,6 @@ def a_map(frame="map"):
 
 
 def update(place, frame="map"):
-    """An update of one pixel."""
     row, col = divmod(place, SIDE)
     cells = np.full((1, 1), 100, np.int8)
     return PatchReceived(MapPatch(Window(row, col, row + 1, col + 1), cells, frame))

@@ -14,9 +14,9 @@ import pytest
 from fasaco_edge.daemon.service import RECORDER_LONGEST_S, RECORDER_STOP_S
 from fasaco_edge.host.processes import cpu_seconds
 from fasaco_edge.recording.read.torn import scan_recording
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process, is_running
-from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room
+from tests.support.outsider import joined_daemon
+from tests.support.processes import is_running
+from tests.support.rooms import map_bytes, pillared_room, room, show_room
 from tests.support.waiting import until
 
 # 400 x 400 cells of the tool's width [m].
@@ -25,7 +25,6 @@ ENDLESS = {"ants": 1_000_000, "budget_s": 3600.0}
 
 
 def cluttered(size_m: float) -> np.ndarray:
-    """Return a room with a pillar every two metres: long walks, many dead ends."""
     pixels = room(size_m, size_m)
     for row in range(4):
         for col in range(4):
@@ -35,19 +34,15 @@ def cluttered(size_m: float) -> np.ndarray:
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_it_while_it_waits(tmp_path, number):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (running, outsider):
         outsider.ask_status()
         print(f"ended after {1e3 * running.stop(number):.0f} ms")
         assert "stopped" in running.log_text()
 
 
 def test_a_signal_ends_it_while_it_plans(tmp_path):
-    with (
-        daemon_process(tmp_path, planner=ENDLESS) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        outsider.put("map", map_bytes(cluttered(HUGE_M)))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
+    with joined_daemon(tmp_path, planner=ENDLESS) as (running, outsider):
+        show_room(outsider, cluttered(HUGE_M), 0.75, 0.75)
         status = outsider.wait_status(lambda status: status["plan"]["planning"])
         assert status["coverage"]["coverable"] > 100_000
         time.sleep(0.5)
@@ -58,7 +53,7 @@ def test_a_signal_ends_it_while_it_compiles(tmp_path):
     """A fresh cache takes many seconds; nobody waits for it."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     for loading_s in (0.5, 2.0):
-        with daemon_process(tmp_path, env=cache) as running, Outsider(running.endpoint) as outsider:
+        with joined_daemon(tmp_path, env=cache) as (running, outsider):
             outsider.put("map", map_bytes(pillared_room()))
             outsider.wait_status(lambda status: status["state"] == "loading")
             time.sleep(loading_s)
@@ -68,12 +63,8 @@ def test_a_signal_ends_it_while_it_compiles(tmp_path):
 
 def test_it_answers_while_it_plans(tmp_path):
     """Statuses come once a second; on a busy machine later, but not after more work."""
-    with (
-        daemon_process(tmp_path, planner=ENDLESS) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        outsider.put("map", map_bytes(cluttered(HUGE_M)))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
+    with joined_daemon(tmp_path, planner=ENDLESS) as (_, outsider):
+        show_room(outsider, cluttered(HUGE_M), 0.75, 0.75)
         outsider.wait_status(lambda status: status["plan"]["planning"])
         since = outsider.ask_status()["uptime_s"]
         later = outsider.wait_status(lambda status: status["uptime_s"] > since + 2.0)
@@ -89,12 +80,8 @@ def test_it_answers_while_it_plans(tmp_path):
 
 @contextmanager
 def recording_into(folder):
-    """A daemon that records, and the process of its recorder."""
     pytest.importorskip("rerun")
-    with (
-        daemon_process(folder, "--record", str(folder)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(folder, "--record", str(folder)) as (running, outsider):
         status = outsider.wait_status(
             lambda status: (status["recorder"] or {}).get("state") == "recording"
         )
@@ -104,8 +91,7 @@ def recording_into(folder):
 def test_a_killed_daemon_leaves_no_recorder(tmp_path):
     with recording_into(tmp_path) as (running, recorder):
         assert is_running(recorder)
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
+        running.kill()
         until(lambda: not is_running(recorder), why=lambda: "the recorder outlives its daemon")
     assert list(tmp_path.glob("*.rrd"))
 

@@ -8,9 +8,9 @@ import pytest
 
 from tests.daemon.test_mask_topic import MISSION, put_mask
 from tests.daemon.test_mission import planned
-from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.outsider import TIMEOUT_S, joined_daemon
 from tests.support.processes import daemon_process, free_endpoint
-from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
+from tests.support.rooms import FREE, WALL, fill, room, show_room
 from tests.support.router import router_process
 
 ROOM = room(6.0, 4.0)
@@ -19,12 +19,10 @@ OVER_ROBOT = fill(BLANK, 0.3, 0.3, 2.0, 2.0, WALL)
 
 
 def drive(outsider, paths):
-    """Send map and pose until there is a path to drive; return how many paths have come."""
     deadline = time.monotonic() + TIMEOUT_S
     while not any(map(is_driven, paths.heard)):
         assert time.monotonic() < deadline, outsider.ask_status()
-        outsider.put("map", map_bytes(ROOM))
-        outsider.put("pose", pose_bytes(1.0, 1.0))
+        show_room(outsider, ROOM, 1.0, 1.0)
         time.sleep(0.2)
     outsider.wait_status(lambda status: status["state"] == "covering")
     return len(paths.heard)
@@ -40,17 +38,13 @@ def stops(heard):
 
 @pytest.fixture
 def bus():
-    """The ``bus`` section of daemons at a router that outlives them."""
     endpoint = free_endpoint()
     with router_process(endpoint):
         yield {"listen": [], "connect": [endpoint], "mode": "client"}
 
 
 def test_a_mask_over_a_driving_robot(tmp_path):
-    with (
-        daemon_process(tmp_path, mission=dict(MISSION)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with joined_daemon(tmp_path, mission=dict(MISSION)) as (_, outsider):
         put_mask(outsider, BLANK)
         paths = outsider.listen("path")
         since = drive(outsider, paths)
@@ -62,7 +56,7 @@ def test_a_mask_over_a_driving_robot(tmp_path):
 
 
 def test_the_end_of_the_daemon(tmp_path, bus):
-    with daemon_process(tmp_path, bus=bus) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path, bus=bus) as (running, outsider):
         paths = outsider.listen("path")
         since = drive(outsider, paths)
         running.stop()
@@ -71,7 +65,7 @@ def test_the_end_of_the_daemon(tmp_path, bus):
 
 def test_a_daemon_that_was_killed_and_started_again(tmp_path, bus):
     """Its follower may still have the path of before."""
-    with daemon_process(tmp_path, bus=bus) as running, Outsider(running.endpoint) as outsider:
+    with joined_daemon(tmp_path, bus=bus) as (running, outsider):
         drive(outsider, outsider.listen("path"))
         running.kill()
         begun = outsider.listen("path", late=False, begins=True)

@@ -21,7 +21,7 @@ from tests.mission.test_idle_places import FAR, drive_with, in_or_beside
 from tests.serve.serving import looking, served
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process, fasaco_edge, free_endpoint
-from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.rooms import room, show_room
 from tests.support.ros_robot import DIAGNOSTICS, Naming, ros_robot
 from tests.support.waiting import meanwhile
 from tests.wire import oracle
@@ -33,8 +33,6 @@ OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 @dataclass
 class Battery:
-    """A battery that publishes its level, which changes by ``step`` with each message."""
-
     outsider: Outsider
     level: float = 0.18
     step: float = 0.0
@@ -45,7 +43,6 @@ class Battery:
         self.outsider.put("battery", payload, BATTERY_STATE)
 
     def on(self):
-        """Publish."""
         return meanwhile(self.publish, PERIOD_S)
 
 
@@ -69,8 +66,7 @@ def test_all_outputs_report_a_dead_dock(tmp_path):
         looking(page) as looker,
     ):
         diagnostics = robot.listen("diagnostics", DIAGNOSTICS)
-        outsider.put("map", map_bytes(room(3.0, 3.0)))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
+        show_room(outsider, room(3.0, 3.0), 0.75, 0.75)
         battery = Battery(outsider)
         with battery.on():
             status = outsider.wait_status(lambda status: status["state"] == "charging")
@@ -110,7 +106,6 @@ def test_all_outputs_report_a_dead_dock(tmp_path):
 
 
 def before_a_mission():
-    """Return a status board, and what it reports of: nothing has come yet."""
     config = DaemonConfig()
     keeper = LedgerKeeper(NoDisk(), config.cell_m, autostart=True)
     return StatusBoard(config), MissionRunner(config, keeper, make_mailbox(100)), keeper

@@ -12,8 +12,6 @@ from fasaco_edge.wire.documents.turns import decode_turns
 
 
 class Publisher:
-    """A publisher that nobody hears yet."""
-
     def __init__(self):
         self.is_heard, self.sent = False, []
 

@@ -14,8 +14,7 @@ from fasaco_edge.doctor import session
 from fasaco_edge.doctor.finding import CheckContext, Level
 from tests.daemon.test_mask_topic import AROUND, BLANK, MASK, driven
 from tests.daemon.test_mission import planned
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
+from tests.support.outsider import joined_daemon
 from tests.support.rooms import WALL, fill, lanes, map_bytes, pose_bytes, room
 from tests.support.waiting import meanwhile, until
 
@@ -27,7 +26,6 @@ PERIOD_S, TURNS = 0.1, 20
 
 @contextmanager
 def program(endpoint, *, stamps=True):
-    """A session of somebody's; timestamps on its samples say whose they are."""
     text = {"mode": "client", "connect": {"endpoints": [endpoint]}}
     text["timestamping"] = {"enabled": stamps}
     with zenoh.open(zenoh.Config.from_json5(json.dumps(text))) as opened:
@@ -59,8 +57,7 @@ def counting(one, other):
 
 def test_two_publishers_of_maps_do_not_alternate_the_path(tmp_path):
     with (
-        daemon_process(tmp_path) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(tmp_path) as (daemon, outsider),
         program(daemon.endpoint) as one,
         program(daemon.endpoint) as other,
     ):
@@ -89,8 +86,7 @@ def test_two_publishers_of_maps_do_not_alternate_the_path(tmp_path):
 
 def test_two_anonymous_publishers_are_found_by_alternating_maps(tmp_path):
     with (
-        daemon_process(tmp_path) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(tmp_path) as (daemon, outsider),
         program(daemon.endpoint, stamps=False) as one,
         program(daemon.endpoint, stamps=False) as other,
     ):
@@ -109,8 +105,7 @@ def test_two_anonymous_publishers_are_found_by_alternating_maps(tmp_path):
 
 def test_poses_and_masks_of_a_second_publisher_do_not_count(tmp_path):
     with (
-        daemon_process(tmp_path, mission={"keep_out_topic": True}) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(tmp_path, mission={"keep_out_topic": True}) as (daemon, outsider),
         program(daemon.endpoint) as one,
         program(daemon.endpoint) as other,
     ):

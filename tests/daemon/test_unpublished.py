@@ -11,8 +11,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.wire.messages.paths import decode_path
 from tests.daemon.breaking import MISSION_M, MOST_UNSENT, PHEROMONE_M, PLANNER_M, UNSENT
 from tests.support import processes
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
+from tests.support.outsider import joined_daemon
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.waiting import until
 from tests.wire import oracle
@@ -31,7 +30,6 @@ def far_map(x, y):
 
 
 def stand(client, holds, x=0.75, y=0.75):
-    """Say where the robot stands until the status is as it should be."""
     deadline = time.monotonic() + 60.0
     while not holds(status := client.ask_status()):
         assert time.monotonic() < deadline, status
@@ -45,10 +43,7 @@ def breaking(tmp_path, monkeypatch):
     program = (sys.executable, "-m", "tests.daemon.breaking")
     monkeypatch.setattr(processes, "PROGRAM", program)
     # Pheromone is of full plans by the colony alone.
-    with (
-        daemon_process(tmp_path, planner={"name": "fasaco"}) as running,
-        Outsider(running.endpoint) as client,
-    ):
+    with joined_daemon(tmp_path, planner={"name": "fasaco"}) as (running, client):
         yield running, client
         # Told by its exit otherwise: a traceback is in the log here.
         running.kill()
@@ -56,7 +51,7 @@ def breaking(tmp_path, monkeypatch):
 
 def test_a_map_at_the_limit_is_covered(tmp_path):
     corner = 2e7 - 6.0, -2e7 + 0.3
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+    with joined_daemon(tmp_path) as (_, client):
         subscriptions = [client.listen(name) for name in ("path", "coverage", "pheromone")]
         client.put("map", far_map(*corner))
         x, y = corner[0] + 1.05, corner[1] + 1.05
@@ -105,7 +100,7 @@ def test_a_stop_that_fails_before_a_mission_is_sent_later(tmp_path, monkeypatch)
     """The robot may follow the path of an earlier daemon; without a map there is no mission."""
     program = (sys.executable, "-m", "tests.daemon.breaking", UNSENT)
     monkeypatch.setattr(processes, "PROGRAM", program)
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+    with joined_daemon(tmp_path) as (running, client):
         unsent = {"not_published": MOST_UNSENT}
         client.wait_status(lambda status: status["errors"]["by_code"] == unsent)
         reply = until(lambda: client.get("@rpc/path")[0].ok)

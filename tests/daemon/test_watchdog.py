@@ -23,8 +23,6 @@ from fasaco_edge.wire.documents.status import LedgerReport, LoopTimes, Status
 
 
 class Told:
-    """Counts how often it is told that there is progress."""
-
     watchdog_s = 4.0
 
     def __init__(self) -> None:
@@ -35,8 +33,6 @@ class Told:
 
 
 class Hung:
-    """A planner that never comes back, and never asks whether to stop."""
-
     def __init__(self) -> None:
         self.release = threading.Event()
 
@@ -46,8 +42,6 @@ class Hung:
 
 
 class Slow:
-    """A planner that takes long, and gets on."""
-
     def plan(self, problem, stop, observe):
         while not stop(None):
             time.sleep(0.01)
@@ -63,7 +57,6 @@ def problem():
 
 
 def beats(worker: PlanningWorker, turns: int = 5) -> int:
-    """Return how often a loop that turns at times two seconds apart feeds the watchdog."""
     told = Told()
     vitals = Watchdog(told)
     for turn in range(turns):

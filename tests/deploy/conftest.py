@@ -25,7 +25,6 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
 
 @pytest.fixture
 def service(lab: Lab) -> Iterator[Service]:
-    """The planner's unit, installed and not started."""
     unit = Service(lab)
     yield unit
     unit.remove()

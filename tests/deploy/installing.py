@@ -31,7 +31,6 @@ class Robot(Lab):
         return self._run_installer(f"/srv/{version}/install.sh", *words, code=code)
 
     def roll_back(self) -> None:
-        """Go back to the version before."""
         self._run_installer(f"{PREFIX}/current/deploy/install.sh", "--rollback", code=0)
 
     def _run_installer(self, *words: str, code: int) -> subprocess.CompletedProcess[str]:
@@ -46,7 +45,6 @@ class Robot(Lab):
         return self.run("env", f"HOME={HOME}", script, *words).stdout
 
     def version(self, link: str = "current") -> str:
-        """Return the version a link points to."""
         return self.run("readlink", f"{PREFIX}/{link}").stdout.strip()
 
     def answers(self, version: str) -> bool:

@@ -71,7 +71,6 @@ class Lab:
         return done
 
     def write(self, path: str, text: str) -> None:
-        """Write a file inside, with its folders."""
         file = self.root / path.lstrip("/")
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text, encoding="utf-8")

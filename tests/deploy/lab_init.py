@@ -66,7 +66,6 @@ def main(orders: dict) -> None:
 
 
 def mount(*words: object) -> None:
-    """Mount, or end with mount's own complaint."""
     subprocess.run(["mount", *map(str, words)], check=True)
 
 
@@ -84,7 +83,6 @@ def own_folders(root: Path, place: Path) -> None:
 
 
 def kernel_interfaces(root: Path) -> None:
-    """Mount /proc, /sys, cgroups, /run and /tmp."""
     mount("-t", "proc", "proc", root / "proc")
     mount("-t", "sysfs", "sysfs", root / "sys")
     mount("-t", "cgroup2", "cgroup2", root / "sys/fs/cgroup")

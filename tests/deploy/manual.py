@@ -31,7 +31,6 @@ class Block:
 
 
 def blocks() -> list[Block]:
-    """Return the manual's blocks."""
     found = []
     for section in re.split(r"^## ", MANUAL.read_text(encoding="utf-8"), flags=re.MULTILINE):
         title, _, text = section.partition("\n")

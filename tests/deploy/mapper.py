@@ -7,15 +7,14 @@ import sys
 import time
 
 from tests.support.outsider import Outsider
-from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.rooms import room, show_room
 
 SIZE_M = 60.0
 STORM = 2000
 
 
 def give_hall(outsider: Outsider) -> None:
-    outsider.put("map", map_bytes(room(SIZE_M, SIZE_M)))
-    outsider.put("pose", pose_bytes(0.75, 0.75))
+    show_room(outsider, room(SIZE_M, SIZE_M), 0.75, 0.75)
     outsider.wait_status(lambda status: status["plan"]["planning"])
 
 

@@ -4,6 +4,5 @@ from tests.deploy.lab import Lab
 
 
 def recordings(lab: Lab) -> int:
-    """Return how many files there are."""
     listed = lab.run("find", "/var/log/private/fasaco-edge-recorder", "-name", "*.rrd", check=False)
     return len(listed.stdout.split())

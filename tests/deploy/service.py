@@ -41,12 +41,10 @@ class Service:
         self.lab.write(CONFIG, yaml.safe_dump(QUIET | sections) if text is None else text)
 
     def drop_in(self, name: str, text: str) -> None:
-        """Add a drop-in."""
         self.lab.write(f"/etc/systemd/system/{self.name}.service.d/{name}.conf", text)
         self.reload_units()
 
     def reload_units(self) -> None:
-        """Let systemd read units again."""
         self.lab.run("systemctl", "daemon-reload")
 
     def start(self, *, fails: bool = False) -> float:
@@ -72,7 +70,6 @@ class Service:
         self.reload_units()
 
     def show(self, name: str) -> str:
-        """Return one property of the unit."""
         return self.lab.run("systemctl", "show", "-P", name, self.name).stdout.strip()
 
     @property
@@ -81,7 +78,6 @@ class Service:
         return int(self.show("MainPID"))
 
     def signal(self, name: str) -> None:
-        """Send its main process a signal."""
         self.lab.run("kill", f"-{name}", str(self.pid))
 
     def journal(self) -> list[dict[str, Any]]:
@@ -100,7 +96,6 @@ class Service:
         return self.lab.run(*words).stdout
 
     def ask(self, name: str = "status") -> dict[str, Any]:
-        """Ask the daemon over the bus."""
         done = self.lab.run("fasaco-edge", "ask", name, "--json")
         answer: dict[str, Any] = json.loads(done.stdout)
         return answer

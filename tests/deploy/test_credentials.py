@@ -23,7 +23,6 @@ KEPT = "/etc/fasaco-edge/tls"
 
 
 def install(service: Service, files: dict[str, str], folder: str = KEPT) -> None:
-    """Keep files for root alone, and let a service have them."""
     names = {"root_ca": "ca.pem", "certificate": "cert.pem", "private_key": "key.pem"}
     for key, name in names.items():
         service.lab.write(f"{folder}/{name}", Path(files[key]).read_text())

@@ -22,7 +22,6 @@ STARTS = {"r1": "2.0,-2.4", "r2": "6.45,3.45"}
 
 @pytest.fixture
 def services(lab: Lab) -> Iterator[dict[str, Service]]:
-    """A unit for each robot, installed and not started."""
     unit, found = (UNITS / "fasaco-edge.service").read_text(), {}
     with ExitStack() as stack:
         for name in STARTS:
@@ -68,7 +67,6 @@ def has_part(status: dict[str, Any]) -> bool:
 
 
 def has_progress(status: dict[str, Any]) -> bool:
-    """Return whether a robot's progress is on disk."""
     return bool(status) and status["ledger"]["age_s"] is not None
 
 

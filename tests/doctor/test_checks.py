@@ -16,8 +16,7 @@ from fasaco_edge.config.config import DaemonConfig, MetricsConfig, MissionPolicy
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.security import BusConfig
 from fasaco_edge.doctor import computer, report, security, session
-from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level
-from fasaco_edge.doctor.unit import Unit, find_unit
+from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels import manifest
 from fasaco_edge.kernels.folder import wanted_folder
 from fasaco_edge.planners.stages import STAGES
@@ -27,7 +26,7 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import QOS
 from tests.kernels.harm import HARMS
 from tests.kernels.installations import fill_with
-from tests.support.outsider import Outsider
+from tests.support.outsider import Outsider, joined_daemon
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes
 from tests.support.waiting import meanwhile
@@ -315,7 +314,7 @@ def test_a_daemon_that_loads_lacks_nothing_yet():
 
 
 def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
-    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (daemon, outsider):
         context = at(daemon.endpoint)
         met = session.session(context)
         assert met.level is Level.OK

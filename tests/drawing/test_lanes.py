@@ -11,7 +11,6 @@ def walk(*points):
 
 
 def joined(starts, ends):
-    """Return the corners of a line after checking that it has no gap."""
     np.testing.assert_allclose(starts[1:], ends[:-1])
     return np.vstack([starts[:1], ends]).tolist()
 

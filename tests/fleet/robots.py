@@ -30,11 +30,9 @@ class FleetRobot:
         self.go()
 
     def look(self) -> None:
-        """Publish the map: a daemon that starts needs it."""
         self.seat.put("map", map_bytes(self.floor))
 
     def go(self) -> None:
-        """Drive to the next centre of a cell, and report the pose."""
         if len(self._path.heard) > self._seen:
             self._seen = len(self._path.heard)
             message = oracle.from_bytes("nav_msgs/msg/Path", self._path.heard[-1].payload)

@@ -19,7 +19,6 @@ CELL_M = 0.3
 
 
 def tiles(cells: Iterable[tuple[int, int]]) -> tuple[CellTile, ...]:
-    """Return cells as tiles of 64 x 64."""
     masks: dict[tuple[int, int], np.ndarray] = {}
     for row, col in cells:
         mask = masks.setdefault((row // 64, col // 64), np.zeros((64, 64), np.bool_))
@@ -39,8 +38,6 @@ def member(
 
 
 class Teller:
-    """A robot that tells what a test wants it to."""
-
     def __init__(self, bus: Bus, name: str) -> None:
         keys = Keys(name)
         self.name = name
@@ -50,17 +47,13 @@ class Teller:
         }
 
     def tell(self, **members: Any) -> None:
-        """Send a message to the fleet, see ``member``."""
         self.send("fleet", encode_json(member(**members)))
 
     def stand(self, x: float, y: float) -> None:
-        """Send a pose."""
         self.send("pose", pose_bytes(x, y))
 
     def show(self, pixels: Pixels) -> None:
-        """Send a map."""
         self.send("map", map_bytes(pixels))
 
     def send(self, topic: str, payload: bytes) -> None:
-        """Send any bytes on a topic."""
         self._publishers[topic].put(payload)

@@ -59,7 +59,6 @@ class ClosedLoop:
         self._due = 0.0
 
     def send(self, xy, yaw=None):
-        """Publish a path."""
         self.follower.take_path(path_message(xy, yaw))
 
     @property
@@ -69,16 +68,13 @@ class ClosedLoop:
         return points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9)]
 
     def wait(self, seconds):
-        """Let some time pass."""
         until = self.now + seconds
         self.run(lambda: self.now > until)
 
     def drive(self, most_s=600.0):
-        """Let it drive its path to the end; return the seconds that took."""
         return self.run(lambda: self.follower.state is FollowerState.DRIVEN, most_s)
 
     def run(self, until, most_s=600.0):
-        """Let time pass until ``until()`` holds; return the seconds that took."""
         begun = self.now
         while not until():
             assert self.now - begun < most_s, (self.follower.state, self.follower.detail)

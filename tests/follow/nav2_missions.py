@@ -20,8 +20,6 @@ Point = tuple[float, float]
 
 
 class Robot:
-    """A look-alike that runs."""
-
     def __init__(self, **wanted: Any) -> None:
         words = [sys.executable, "-m", "tests.support.nav2_robot", json.dumps(wanted)]
         self._figures: dict[str, Any] = {}
@@ -32,7 +30,6 @@ class Robot:
         assert self._process.stdout.readline() == "ready\n"
 
     def end(self) -> dict[str, Any]:
-        """End it; return what it did."""
         if not self._figures:
             out, _ = self._process.communicate(timeout=60)
             self._figures = json.loads(out)
@@ -49,7 +46,6 @@ class Robot:
 def nav2_follower(
     folder: Path, endpoint: str, ros2: dict[str, Any], **robot: Any
 ) -> Iterator[Path]:
-    """Run ``fasaco-edge follow`` that hands the path to Nav2; yield where it logs."""
     config, log = folder / "follow.yaml", folder / "follow.log"
     sections = {
         "robot": robot,
@@ -87,7 +83,6 @@ def passed(trail: Sequence[Point], points: Sequence[Point], near: float = 0.15) 
 
 
 def kind_of(domain: int | None) -> dict[str, Any]:
-    """Return the keys of ``ros2`` for a domain of rmw_zenoh, or None for a bridge."""
     if domain is None:
         return {"kind": "bridge"}
     return {"kind": "rmw_zenoh", "domain": domain}

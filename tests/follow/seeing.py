@@ -89,7 +89,6 @@ class Seeing:
         self.follower.take_path(path_message(xy))
 
     def run(self, seconds):
-        """Let time pass; return the states."""
         return [self.step() for _ in range(round(seconds / PERIOD_S))]
 
     def step(self):

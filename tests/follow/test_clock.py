@@ -2,7 +2,7 @@
 
 import pytest
 
-from fasaco_edge.follow.clock import LEAD_S, Clock
+from fasaco_edge.follow.inputs import LEAD_S, Clock
 
 SECOND = 1_000_000_000
 

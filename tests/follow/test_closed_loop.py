@@ -183,7 +183,6 @@ def test_a_path_that_begins_far_away_is_not_driven_to():
 
 
 def carry(loop, left_m):
-    """Somebody carries it away, a little at a time."""
     at = loop.world.pose
     loop.world.drive = type(loop.world.drive)(Pose2D(at.x, at.y + left_m, at.yaw))
 

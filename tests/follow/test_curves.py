@@ -36,7 +36,6 @@ def curve_of(line_xy, *, reverses, clearance_m=0.05):
 
 
 def loop_on(curve, **conditions):
-    """A loop with a base of that radius, at the beginning of a curve."""
     loop = ClosedLoop(ROOM, Pose2D(*curve.poses[0]), turn_m=TURN_M, **conditions)
     loop.send(curve.xy, curve.poses[:, 2])
     return loop

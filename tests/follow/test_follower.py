@@ -18,8 +18,6 @@ AHEAD = [(0.0, 0.0), (5.0, 0.0), (5.0, 5.0)]
 
 
 class Told:
-    """A follower that drives ahead, and time that passes."""
-
     def __init__(self):
         self.now = 10.0
         self.begin_anew(AHEAD)
@@ -27,7 +25,6 @@ class Told:
         assert self.follower.state is FollowerState.DRIVING
 
     def begin_anew(self, xy, limits=LIMITS):
-        """Start the follower again, at 0, 0."""
         self.x = 0.0
         self.follower = Follower(limits)
         self.follower.take_planner("a1")
@@ -43,7 +40,6 @@ class Told:
         self.follower.pose_fault = MalformedMessage(why)
 
     def states_where_it_is(self, seconds):
-        """Return the state of each step while the pose stays as it is."""
         states = []
         for _ in range(round(seconds / PERIOD_S)):
             self.pose()
@@ -78,43 +74,23 @@ def told():
     return Told()
 
 
-def stops(name, act, state, words=""):
-    return pytest.param(act, state, words, id=name)
-
-
 NAN = bytes.fromhex("000000000000f87f")
+PATH = path_message(AHEAD)
+STOPS = {
+    "an empty path": (path_of(path_message([])), FollowerState.EMPTY_PATH, "mission status"),
+    "no path": (path_of(b""), FollowerState.BAD_PATH, "encapsulation header"),
+    "a short path": (path_of(PATH[:-1]), FollowerState.BAD_PATH, "poses"),
+    "a long path": (path_of(PATH + b"junk"), FollowerState.BAD_PATH, "payload"),
+    "NaN": (path_of(PATH[:-8] + NAN), FollowerState.BAD_PATH, "orientation"),
+    "another frame": (lambda told: told.pose(frame="odom"), FollowerState.WRONG_FRAME, "'odom'"),
+    "a jump": (lambda told: told.pose(y=2.0), FollowerState.POSE_JUMPED, "by 2.0 m"),
+    "a turn": (lambda told: told.pose(yaw=2.5), FollowerState.POSE_JUMPED, "by 0.0 m and 14"),
+    "no pose": (lambda told: told.refuse_pose("got nan"), FollowerState.BAD_POSE, "got nan"),
+    "no planner": (lambda told: told.follower.take_planner(""), FollowerState.NO_DAEMON, ""),
+}
 
 
-@pytest.mark.parametrize(
-    ("act", "state", "words"),
-    [
-        stops(
-            "an empty path", path_of(path_message([])), FollowerState.EMPTY_PATH, "mission status"
-        ),
-        stops("no path", path_of(b""), FollowerState.BAD_PATH, "encapsulation header"),
-        stops("a short path", path_of(path_message(AHEAD)[:-1]), FollowerState.BAD_PATH, "poses"),
-        stops(
-            "a long path", path_of(path_message(AHEAD) + b"junk"), FollowerState.BAD_PATH, "payload"
-        ),
-        stops(
-            "NaN", path_of(path_message(AHEAD)[:-8] + NAN), FollowerState.BAD_PATH, "orientation"
-        ),
-        stops(
-            "another frame",
-            lambda told: told.pose(frame="odom"),
-            FollowerState.WRONG_FRAME,
-            "'odom'",
-        ),
-        stops("a jump", lambda told: told.pose(y=2.0), FollowerState.POSE_JUMPED, "by 2.0 m"),
-        stops(
-            "a turn", lambda told: told.pose(yaw=2.5), FollowerState.POSE_JUMPED, "by 0.0 m and 14"
-        ),
-        stops(
-            "no pose", lambda told: told.refuse_pose("got nan"), FollowerState.BAD_POSE, "got nan"
-        ),
-        stops("no planner", lambda told: told.follower.take_planner(""), FollowerState.NO_DAEMON),
-    ],
-)
+@pytest.mark.parametrize(("act", "state", "words"), STOPS.values(), ids=STOPS)
 def test_it_stands_with_a_reason_and_drives_on_afterwards(told, act, state, words):
     told.drive(1.0)
     command = told.step()

@@ -16,8 +16,6 @@ AHEAD, SLOWLY, TURNING = VelocityCommand(0.3), VelocityCommand(0.05), VelocityCo
 
 
 class Base:
-    """A base that is to execute one command, and does a share of it, whatever the grip says."""
-
     def __init__(self, command, share, noise_m=0.0, hz=20.0, drift_m_s=0.0, seed=0):
         self.grip, self.pushed_s, self.losses = Grip(), 0.0, 0
         self._estimate = PoseEstimate(LIMITS)
@@ -26,7 +24,6 @@ class Base:
         self.pose, self._tick, self._is_lost = Pose2D(0.0, 0.0), 0, False
 
     def told(self):
-        """Return its pose as a localiser tells it."""
         dx, dy, turn = (self._rng.gauss(0.0, self._noise) for _ in range(3))
         turn *= math.radians(2.0) / 0.04
         pose = self.pose

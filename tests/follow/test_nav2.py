@@ -39,8 +39,6 @@ NO_ANSWER = None
 
 
 class Drive:
-    """A follower whose daemon is there, and a robot that is put where the test says."""
-
     def __init__(self, *points, is_curved=False):
         ids = itertools.count(1)
         self.follower = Nav2Follower(
@@ -74,7 +72,6 @@ class Drive:
         self.follower.take_ending(request.id, Ending(status, code), "", self.now)
 
     def begun(self, x=0.0, y=0.0):
-        """Return the first goal, which Nav2 has accepted."""
         (goal,) = self.step(x, y)
         assert isinstance(goal, SendPiece)
         self.accept(goal)

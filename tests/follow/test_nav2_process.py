@@ -8,8 +8,7 @@ import pytest
 from fasaco_edge.wire.messages.poses import decode_pose
 from tests.follow.nav2_missions import Robot, kind_of, nav2_follower, passed
 from tests.support.driven_base import DrivenBase
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
+from tests.support.outsider import joined_daemon
 from tests.support.rooms import map_bytes, room
 from tests.support.waiting import until
 
@@ -37,7 +36,6 @@ def wait(holds, log):
 
 
 def listen(base):
-    """Return where the robot is, pose by pose."""
     poses = []
     schema = "geometry_msgs/msg/PoseStamped"
     base.bus.subscribe(
@@ -54,7 +52,6 @@ def undisturbed(done):
 
 @contextmanager
 def driving(base, folder, domain=7, nav2=None, **robot):
-    """A look-alike of Nav2 at 0, 0, a follower and a daemon that plans; where the follower logs."""
     wanted = {"endpoint": base.endpoint, "domain": domain, "start": (0.0, 0.0), **robot}
     ros2 = {**kind_of(domain), "nav2": nav2 or {}}
     with Robot(**wanted) as look_alike, nav2_follower(folder, base.endpoint, ros2) as log:
@@ -123,8 +120,7 @@ def test_a_mission_is_driven_by_nav2_to_its_end(tmp_path):
     names = {"name": "robot", "speed_m_s": 1.0, "quarter_turn_s": 0.5}
     ros2 = {**kind_of(0), "pose": "geometry_msgs/msg/PoseStamped"}
     with (
-        daemon_process(tmp_path, ros2=ros2, robot=names) as daemon,
-        Outsider(daemon.endpoint) as native,
+        joined_daemon(tmp_path, ros2=ros2, robot=names) as (daemon, native),
         Robot(
             endpoint=daemon.endpoint, domain=0, start=(0.6, 0.6), abort_every_s=6.0, delay_s=0.5,
             lost=0.02,

@@ -18,7 +18,6 @@ def line_of(*points):
 
 
 def pieces_of(line, near=NEAR):
-    """Return the pieces that follow each other over a line."""
     pieces, start = [], 0.0
     while start < line.length(1e6) - LEAST_M:
         end = end_of_piece(line, start, near)

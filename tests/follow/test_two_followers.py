@@ -32,7 +32,6 @@ def base():
 
 
 def standing(base):
-    """Return the last chunk of each follower's token, sorted."""
     return sorted(key.rpartition("/")[2] for key in base.bus.alive(base.keys.of(topics.DRIVER)))
 
 

@@ -51,7 +51,6 @@ class Pauses:
 
 
 def planned(grid: OccupancyGrid, seed: int, pauses: Pauses, observe=ignore, line="thorough"):
-    """Return the ground, walk and line of a search that ends after some pauses."""
     search = fe.Search(seed=seed, budget_s=1e6)
     ground = PlanGround.of_floor(grid, ROBOT, (0.5, 0.5), WALLS)
     ending = SearchEnd(None, pauses, lambda _: None, None)
@@ -61,7 +60,6 @@ def planned(grid: OccupancyGrid, seed: int, pauses: Pauses, observe=ignore, line
 
 
 def cost_s(ground: PlanGround, xy: np.ndarray) -> float:
-    """Return what is minimised, counted anew."""
     floor, config = ground.floor, LINES["thorough"]
     assert floor is not None
     unit_m, sweeps = floor.geometry.resolution, _sweeps(floor)

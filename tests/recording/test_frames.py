@@ -35,7 +35,6 @@ BEGAN_NS = 1_767_225_600 * 10**9
 
 
 def recorded(folder, *batches):
-    """Record some of all that a recorder does; return the file."""
     file = folder / f"{RUN_ID}-part1.rrd"
     part = RecordingPart(file, RUN_ID)
     for number in range(5):
@@ -140,7 +139,6 @@ LIES = {
 
 
 def repacked(recording, folder, body):
-    """Copy a recording with another body of its first chunk; return the file."""
     content = bytearray(recording.read_bytes())
     at, _, length = next(frame for frame in frames_of(content) if frame[1] == 2)
     content[at : at + FRAME.size + length] = FRAME.pack(2, len(body)) + body
@@ -158,7 +156,6 @@ def varint(value):
 
 
 def chunk_of(batch, *, claimed=None, options=None):
-    """Return a frame's body that holds a record batch, packed with LZ4."""
     sink = pa.BufferOutputStream()
     with pa.ipc.new_stream(sink, batch.schema, options=options) as writer:
         writer.write_batch(batch)

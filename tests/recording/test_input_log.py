@@ -29,13 +29,7 @@ from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from tests.support.recordings import (
-    TEXT,
-    bus_on_free_port,
-    read_column,
-    read_summary,
-    writer_in,
-)
+from tests.support.recordings import TEXT, bus_on_free_port, read_column, read_summary, writer_in
 from tests.support.senders import Sender
 
 SECOND_NS = 1_000_000_000
@@ -44,8 +38,6 @@ BEGAN_NS = 1_700_000_000 * SECOND_NS
 
 @dataclass
 class Desk:
-    """A writer with an input log, and a clock that runs as fast as the test."""
-
     folder: Path
     part_bytes: int = 10**9
     now_ns: int = 0
@@ -56,7 +48,6 @@ class Desk:
         self.inputs = InputLog(self.writer, BEGAN_NS)
 
     def hear(self, topic: str, payload: bytes, attachment: bytes = b"", after_s: float = 0.1):
-        """Let a sample come."""
         self.now_ns += round(after_s * SECOND_NS)
         sample = Sample(f"robot/{topic}", payload, "some/msg/Type", attachment)
         arrival = Arrival(topic, sample, self.now_ns, BEGAN_NS + self.now_ns)
@@ -68,7 +59,6 @@ class Desk:
         return arrival
 
     def close(self) -> list[Path]:
-        """End the recording; return its parts."""
         self.inputs.finish()
         assert self.writer.close()
         return parts(self.folder)
@@ -229,7 +219,6 @@ def test_a_recorder_reports_while_it_catches_up(tmp_path, monkeypatch):
 
 
 def hear(one, bus, count):
-    """Let poses wait for a recorder; return what they are."""
     one.listen()
     publisher = Sender(bus, topics.POSE)
     poses = [encode_pose_stamped(StampedPose(Pose2D(x, 0.0), "map", x)) for x in range(count)]

@@ -30,8 +30,6 @@ RATE = RATES[entities.MAP]
 
 
 class Canvas:
-    """Layers, and what was drawn when."""
-
     def __init__(self) -> None:
         self.layers = Layers()
         self.drawn: list[tuple[str, int]] = []

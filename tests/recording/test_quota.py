@@ -17,7 +17,6 @@ AT_BOOT, LAST_WEEK, NEXT_YEAR = (
 
 
 def run(folder: Path, began: datetime, robot: str = "maja", parts: int = 1) -> list[str]:
-    """Write parts of 10 bytes as a recorder that begins then; return their names."""
     names = [f"{next_run(folder, robot, began)}-part{number + 1}.rrd" for number in range(parts)]
     for name in names:
         (folder / name).write_bytes(bytes(10))

@@ -43,14 +43,7 @@ from tests.support.recordings import (
     read_summary,
     recorder_process,
 )
-from tests.support.scripted_mission import (
-    CELL_M,
-    COLS,
-    RADIUS_M,
-    ROWS,
-    Mission,
-    building,
-)
+from tests.support.scripted_mission import CELL_M, COLS, RADIUS_M, ROWS, Mission, building
 from tests.support.senders import Sender
 from tests.wire.schemas import check
 
@@ -65,8 +58,6 @@ STRIPS = "LineStrips3D:strips"
 
 @dataclass(frozen=True)
 class Recorded:
-    """A mission that was recorded and ended by SIGTERM."""
-
     path: Path
     mission: Mission
     summary: RecordingSummary

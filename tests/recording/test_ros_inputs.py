@@ -17,8 +17,7 @@ from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.replay import Replay, read_run
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, TF_MESSAGE
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
+from tests.support.outsider import joined_daemon
 from tests.support.recordings import read_summary
 from tests.support.rooms import map_bytes, pillared_room
 from tests.support.ros_robot import GRID, Naming, ros_robot
@@ -33,8 +32,7 @@ def test_maps_and_transforms_are_in_the_recording(domain, tmp_path):
     ros2 = {"kind": kind, "namespace": "/robot1", "frames": {"map": "map", "robot": "body"}}
     out = tmp_path / "runs"
     with (
-        daemon_process(tmp_path, "--record", str(out), ros2=ros2) as running,
-        Outsider(running.endpoint) as native,
+        joined_daemon(tmp_path, "--record", str(out), ros2=ros2) as (running, native),
         ros_robot(running.endpoint, naming) as robot,
     ):
         robot.put("map", GRID, map_bytes(pillared_room()), latched=True)

@@ -45,7 +45,6 @@ SIMULATED = {"config": {"robot": {"time_scale": 20.0}}}
 
 
 def outcome(*states, driven_s=90.0, first_ns=5_000_000_000, **members):
-    """Return the line after a drive, and these states with their reasons."""
     one = Outcome()
     for stamp_ns in (first_ns, first_ns + round(driven_s * 1e9) if first_ns else 0):
         one.add_pose(StampedPose(Pose2D(1.0, 1.0), stamp_ns=stamp_ns))

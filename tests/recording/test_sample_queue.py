@@ -24,8 +24,6 @@ TOPICS = ["map", "map_update", "pose", "path", "coverage", "pheromone", "status"
 
 
 def queue_of(capacity: int) -> SampleQueue:
-    """Return an queue whose clock is in the samples."""
-
     def stamp(topic: str, sample: Sample) -> Arrival:
         number = int(sample.key)
         return Arrival(topic, sample, number, number)

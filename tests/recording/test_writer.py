@@ -27,8 +27,6 @@ from tests.support.recordings import read_column, read_static, read_summary, wri
 
 
 class Clock:
-    """Monotonic time that runs as fast as the test."""
-
     def __init__(self) -> None:
         self.now_ns = 10**18
 
@@ -219,6 +217,5 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
 
 
 def drain(pipe, copy) -> None:
-    """Copy what comes out of ``pipe`` until its writer closes it."""
     with pipe.open("rb") as source, copy.open("wb") as target:
         shutil.copyfileobj(source, target)

@@ -30,12 +30,10 @@ KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]
 
 
 def received(commands):
-    """Return the commands as a recording has them."""
     return [(at_s, Command(name, order)) for at_s, name, order in commands]
 
 
 def told(*rows, commands=()):
-    """Return the chapters of data of (time, state, covered, coverable)."""
     statuses = [
         StatusSample(
             at_s,
@@ -181,7 +179,6 @@ ORDER = OrderChapter("itself", 0.0, 100.0, None, "done", True, 400, 400)
 
 
 def run(config=(), **changes):
-    """Return as much of a document as two are compared by."""
     settings = {"robot.tool_width_m": 0.3, "planner.line": "thorough", "robot.overlap": 0.1}
     settings |= {"bus.connect": "tcp/127.0.0.1:1"}
     base = {

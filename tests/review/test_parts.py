@@ -39,7 +39,6 @@ DEAD_DOCK = {"code": "no_current", "text": "the dock gives no current"}
 
 
 def run_told(folder, *, faults, silent=0, killed=False):
-    """Record a run of known figures, in parts as small as can be; return its files."""
     with told_recorder(folder, part_bytes=1) as told:
         told.tell("map", map_bytes(room(2.4, 1.8)))
         told.tell("status", _status("planning", "first plan", {}))

@@ -48,13 +48,11 @@ def ground():
 
 
 def seen_first():
-    """Return what was known of it when the robot began."""
     return fill(ground(), 0.0, 1.2, 4.0, 1.6, UNKNOWN)
 
 
 @pytest.fixture(scope="module")
 def parts(tmp_path_factory):
-    """A robot drives east along a path, until the map grows and another leads back west."""
     folder = tmp_path_factory.mktemp("questions") / "runs"
     with told_recorder(folder, 0.04) as told:
 
@@ -214,7 +212,6 @@ def test_floor_of_a_time_without_poses_is_not_called_missed(review):
 
 
 def with_floor(review, *swept_m2):
-    """Return the review with statuses that report so much swept floor."""
     first, last = review.data.statuses[0], review.data.statuses[-1]
     times = np.linspace(first.at_s, last.at_s, len(swept_m2))
     said = [

@@ -27,7 +27,6 @@ CLOSET = RoomReport(3, "closet", ((1, 1), (2, 1), (2, 2), (1, 2)), 1.0, skip=Tru
 
 
 def driven() -> RunData:
-    """Return the data of a drive: along the hall into the kitchen, and back after a pause."""
     pixels = np.zeros((80, 160), np.int8)
     pixels[[0, -1]] = pixels[:, [0, -1]] = 100
     grid = OccupancyGrid(GridGeometry(80, 160, 0.05, Pose2D(0.0, 0.0)), pixels)

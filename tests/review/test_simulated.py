@@ -30,7 +30,6 @@ ROBOT = {"tool_width_m": 0.3, "radius_m": 0.18, "speed_m_s": SPEED_M_S, "time_sc
 
 
 def record(folder):
-    """Record a robot on a straight line, which is faster than its clock says; return the files."""
     with told_recorder(folder, EVERY_S / SCALE) as told:
         told.tell("map", map_bytes(room(4.0, 3.0)))
         status = {"robot": "one", "state": "covering", "config": {"robot": ROBOT}}

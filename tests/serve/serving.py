@@ -24,23 +24,18 @@ from tests.support.waiting import until
 
 @dataclass
 class Served:
-    """A running server of a page."""
-
     process: subprocess.Popen[bytes]
     address: str
     log: Path
 
     @property
     def url(self) -> str:
-        """Of the page."""
         return f"http://{self.address}/"
 
     def descriptors(self) -> int:
-        """Return how many files and sockets it has open."""
         return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
 
     def get(self, path: str = "/", **headers: str) -> tuple[int, dict[str, str], str]:
-        """Return status, headers and body of what is at ``path``."""
         names = {name.replace("_", "-"): value for name, value in headers.items()}
         request = urllib.request.Request(f"http://{self.address}{path}", headers=names)
         try:
@@ -51,13 +46,11 @@ class Served:
 
 
 def served(folder: Path, endpoint: str, *words: str) -> AbstractContextManager[Served]:
-    """Serve the page of a daemon's robot."""
     return serving(folder, "--connect", endpoint, *words)
 
 
 @contextmanager
 def serving(folder: Path, *words: str) -> Iterator[Served]:
-    """Serve a page; end it, and check how it ended."""
     address = free_endpoint().removeprefix("tcp/")
     log = folder / f"serve-{address.rpartition(':')[2]}.log"
     command = [*PROGRAM, "serve", "--listen", address, *words]
@@ -76,7 +69,6 @@ def serving(folder: Path, *words: str) -> Iterator[Served]:
 
 
 def listens(page: Served) -> bool:
-    """Tell whether a page is served."""
     assert page.process.poll() is None, page.log.read_text()
     try:
         return page.get()[0] == 200
@@ -97,11 +89,9 @@ class Looker:
     asked: int = 0
 
     def send(self, **message: Any) -> None:
-        """Send a message."""
         self.socket.send(json.dumps(message))
 
     def read(self) -> dict[str, Any]:
-        """Return the next message."""
         data = self.socket.recv(TIMEOUT_S)
         if isinstance(data, str):
             message = json.loads(data)
@@ -115,7 +105,6 @@ class Looker:
         return message
 
     def wait(self, kind: str, holds: Callable[[Any], bool] = lambda _: True) -> Any:
-        """Return the first message of a kind, that came or comes, for which ``holds``."""
         if kind in self.seen and holds(self.seen[kind]):
             return self.seen[kind]
         deadline = time.monotonic() + TIMEOUT_S
@@ -128,7 +117,6 @@ class Looker:
     def command(
         self, name: str, order: dict[str, Any] | None = None, **more: Any
     ) -> dict[str, Any]:
-        """Command, again where a busy daemon does not answer in time; return the answer."""
         more |= {} if order is None else {"order": order}
         deadline = time.monotonic() + TIMEOUT_S
         while True:
@@ -141,7 +129,6 @@ class Looker:
 
 @contextmanager
 def looking(page: Served, token: str = "", **options: Any) -> Iterator[Looker]:
-    """Open a page as a viewer."""
     # One that is not read for a while, as a daemon starts, goes on to answer pings.
     unbounded: dict[str, Any] = {"max_size": None, "max_queue": None, "ping_interval": None}
     url = f"ws://{page.address}/live"

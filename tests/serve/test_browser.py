@@ -27,9 +27,18 @@ from websockets.sync.client import ClientConnection, connect
 
 from tests.serve.serving import served
 from tests.serve.test_plain import TECHNICAL
-from tests.support.outsider import TIMEOUT_S, Outsider, open_client
+from tests.support.outsider import TIMEOUT_S, Outsider, joined_daemon, open_client
 from tests.support.processes import daemon_process, free_endpoint
-from tests.support.rooms import HALL, UNKNOWN, begin, drive, fill, lanes, map_bytes, pose_bytes
+from tests.support.rooms import (
+    HALL,
+    UNKNOWN,
+    begin,
+    drive,
+    fill,
+    lanes,
+    map_bytes,
+    show_room,
+)
 from tests.support.router import router_process
 from tests.support.statuses import FULL
 from tests.support.waiting import until
@@ -59,14 +68,11 @@ COVERED = """(() => {
 
 @dataclass
 class Tab:
-    """A tab of the browser."""
-
     socket: ClientConnection
     complaints: list[str] = field(default_factory=list)
     numbers: Iterator[int] = field(default_factory=itertools.count)
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
-        """Call a method of the DevTools protocol."""
         number = next(self.numbers)
         self.socket.send(json.dumps({"id": number, "method": method, "params": params}))
         while True:
@@ -81,16 +87,13 @@ class Tab:
                 return result
 
     def js(self, text: str) -> Any:
-        """Return the value of an expression."""
         return self.call("Runtime.evaluate", expression=text)["result"].get("value")
 
     def click(self, name: str) -> None:
-        """Click a button that can be seen."""
         until(lambda: self.js(f"find({name!r}).offsetParent !== null"), why=lambda: name)
         self.js(f"find({name!r}).click()")
 
     def size(self, size: tuple[int, int], scheme: str) -> None:
-        """Be a screen of that size, light or dark."""
         width, height = size
         screen = {"width": width, "height": height, "deviceScaleFactor": 1}
         self.call("Emulation.setDeviceMetricsOverride", **screen, mobile=size == PHONE)
@@ -103,14 +106,12 @@ class Tab:
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
 
     def touch(self, *way: tuple[float, float]) -> None:
-        """Draw a finger over the screen."""
         for index, (x, y) in enumerate(way):
             kind = "touchMove" if index else "touchStart"
             self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y}])
         self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
     def on_screen(self, x: float, y: float) -> tuple[float, float]:
-        """Return where a point of the map is on the screen."""
         box = "canvas.getBoundingClientRect()"
         text = f"JSON.stringify([toScreen({x}, {y}), {box}.left, {box}.top])"
         (px, py), left, top = json.loads(self.js(text))
@@ -119,7 +120,6 @@ class Tab:
 
 @contextmanager
 def browsing(url: str, folder: Path) -> Iterator[Tab]:
-    """Open a page in a browser of its own."""
     options = ("--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0")
     words = (*options, f"--user-data-dir={folder}", "about:blank")
     quiet = subprocess.DEVNULL
@@ -146,23 +146,19 @@ def browsing(url: str, folder: Path) -> Iterator[Tab]:
 
 
 def pages_at(listed: str) -> list[dict[str, Any]]:
-    """Return the tabs that a browser lists."""
     with urllib.request.urlopen(listed, timeout=TIMEOUT_S) as answer:
         return [tab for tab in json.loads(answer.read()) if tab["type"] == "page"]
 
 
 def has(picture: np.ndarray, colour: str) -> int:
-    """Return how many pixels have a colour."""
     return int((picture == channels(colour)).all(axis=-1).sum())
 
 
 def channels(colour: str) -> list[int]:
-    """Return red, green and blue of a colour of the style."""
     return [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
 
 
 def pause_and_reload(tab: Tab, outsider: Outsider, url: str) -> None:
-    """Pause the mission, and open its page anew."""
     tab.click("pause")
     outsider.wait_status(lambda status: status["state"] == "paused")
     tab.call("Page.navigate", url=url)
@@ -170,7 +166,6 @@ def pause_and_reload(tab: Tab, outsider: Outsider, url: str) -> None:
 
 
 def order_again(tab: Tab, outsider: Outsider, url: str) -> None:
-    """Give the order that was cancelled again, by one tap on a page opened anew."""
     tab.call("Page.navigate", url=url)
     until(lambda: tab.js("find('again').textContent") == "Last order again: area 1")
     photograph(tab, "again")
@@ -182,7 +177,6 @@ def order_again(tab: Tab, outsider: Outsider, url: str) -> None:
 
 
 def canceled(tab: Tab, outsider: Outsider) -> bool:
-    """Tap on Cancel, seen or not; tell whether there is no order any more."""
     tab.js("find('cancel').click()")
     return outsider.ask_status()["mission"]["ordered"] is None
 
@@ -190,14 +184,12 @@ def canceled(tab: Tab, outsider: Outsider) -> bool:
 @needs_browser
 def test_a_mission_is_ordered_by_finger(tmp_path):
     with (
-        daemon_process(tmp_path, mission={"autostart": False}) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(tmp_path, mission={"autostart": False}) as (daemon, outsider),
         served(tmp_path, daemon.endpoint, "--allow-commands") as page,
         browsing(page.url, tmp_path / "browser") as tab,
     ):
         until(lambda: tab.js("model.role") == "operator")
-        outsider.put("map", map_bytes(HALL))
-        outsider.put("pose", pose_bytes(*lanes(1)[0]))
+        show_room(outsider, HALL, *lanes(1)[0])
         # What is left out is not shown by itself before there was an order.
         until(lambda: tab.js("[find('does').textContent, find('left').open].join()") == READY)
         until(lambda: tab.js("Boolean(model.map && model.map.pixel === 0.05 && model.pose)"))
@@ -256,7 +248,6 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
 
 
 def offers_to_start_what_is_drawn(tab: Tab) -> None:
-    """Draw an area in a mission that ends then: the button below the map says what it does."""
     tab.js("drawing.kind = 'zone'; finish([[1, 1], [2, 1], [2, 2]])")
     said = tab.js("""(() => {
       const texts = [], state = model.state;
@@ -272,7 +263,6 @@ def offers_to_start_what_is_drawn(tab: Tab) -> None:
 
 
 def keep_out_of_no_floor(tab: Tab) -> None:
-    """Add and remove a keep-out where no floor is known yet: it is taken, and that is said."""
     far = '{ name: "far", polygon: [[500, 500], [501, 500], [501, 501]] }'
     tab.js(f'command("keep_out_add", {{ keep_out: {far} }})')
     until(lambda: "seen no floor" in tab.js("find('answer').textContent"))
@@ -282,7 +272,7 @@ def keep_out_of_no_floor(tab: Tab) -> None:
 
 @needs_browser
 def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
-    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (daemon, outsider):
         begin(outsider)
         drive(outsider, lanes(12))
         with (
@@ -344,8 +334,7 @@ def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
 @needs_browser
 def test_a_reason_shows_its_floor_on_the_map_and_nothing_else(tmp_path):
     with (
-        daemon_process(tmp_path, planner={"line": "quick"}) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(tmp_path, planner={"line": "quick"}) as (daemon, outsider),
         served(tmp_path, daemon.endpoint, "--allow-commands") as page,
         browsing(page.url, tmp_path / "browser") as tab,
     ):
@@ -417,7 +406,6 @@ def test_with_an_older_daemon_the_page_explains_missing_places(tmp_path):
 
 
 def show_left(tab: Tab, reason: str) -> None:
-    """Tap on a reason for which floor is not swept, until it is painted."""
     tab.js("find('left').open = true")
     every = "[...find('left').querySelectorAll('button')]"
     until(lambda: tab.js(f"{every}.some((b) => b.textContent.includes({reason!r}))"))
@@ -454,13 +442,11 @@ def draw_keep_out(tab: Tab, low: tuple[float, float], high: tuple[float, float])
 
 
 def button(tab: Tab, text: str) -> bool:
-    """Tell whether a button with that text can be seen."""
     every = f"[...document.querySelectorAll('button')].filter((b) => b.textContent === {text!r})"
     return bool(tab.js(f"{every}.some((b) => b.offsetParent !== null)"))
 
 
 def press(tab: Tab, text: str) -> None:
-    """Press the button that has that text."""
     until(lambda: button(tab, text), why=lambda: text)
     every = f"[...document.querySelectorAll('button')].filter((b) => b.textContent === {text!r})"
     tab.js(f"{every}.find((b) => b.offsetParent !== null).click()")

@@ -24,12 +24,10 @@ TECHNICAL = re.compile(
 
 
 def status(**members: object) -> Status:
-    """Return a status with these members."""
     return decode_tolerant(encode_json(FULL | members), Status)
 
 
 def told(of: Status) -> list[str]:
-    """Return all texts for an owner about a status."""
     return [
         plain.word(of.state),
         plain.does(of),
@@ -158,6 +156,5 @@ def test_a_robot_without_a_map_is_shown_so():
 
 
 def told_left(of: Status, ordered: Status | None = None) -> list[tuple[object, ...]]:
-    """Return the parts of the floor that are left."""
     parts = plain.left(of, ordered)
     return [(part.m2 and round(part.m2, 3), part.reason, part.marks, part.places) for part in parts]

@@ -47,7 +47,6 @@ SWEPT = np.array([[100, 40, 0]], np.int8)
 
 
 def told(folder: Path, **options: Any) -> list[Path]:
-    """Record a robot that drives east along a path, and then on another; return the files."""
     folder.mkdir()
     with bus_on_free_port() as (bus, endpoint):
         names = ("map", "pose", "path", "status", "command", "floor")
@@ -97,25 +96,21 @@ def told(folder: Path, **options: Any) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of such a run."""
     (one,) = told(tmp_path_factory.mktemp("one") / "runs")
     return one
 
 
 @pytest.fixture(scope="module")
 def timeline(file: Path) -> Iterator[Timeline]:
-    """The recording, opened."""
     with open_timeline([file]) as opened:
         yield opened
 
 
 def between_s(timeline: Timeline) -> float:
-    """Return a time when the robot had driven the first path, before there was another."""
     return 1e-9 * int(timeline.pose_ns[2] - timeline.began_ns) + 0.2
 
 
 def at(looker: Looker, at_s: float) -> dict[str, Any]:
-    """Go to a time; return what is there then."""
     looker.seen.pop("time", None)
     looker.send(kind="seek", at=at_s)
     looker.wait("time")
@@ -123,7 +118,6 @@ def at(looker: Looker, at_s: float) -> dict[str, Any]:
 
 
 def points(message: dict[str, Any]) -> np.ndarray:
-    """Return the points of a path."""
     xy = np.frombuffer(message["body"], "<f4").reshape(-1, 2)
     return xy + np.array([message["x"], message["y"]])
 

@@ -19,9 +19,8 @@ from tests.serve.serving import served
 from tests.serve.test_browser import Tab, browsing, photograph, press
 from tests.serve.test_plain import TECHNICAL
 from tests.serve.test_served_view import heard, tell
-from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
-from tests.support.rooms import map_bytes, pose_bytes, two_rooms
+from tests.support.outsider import Outsider, joined_daemon
+from tests.support.rooms import show_room, two_rooms
 from tests.support.waiting import until
 
 IN_VIEW = """(() => {
@@ -104,15 +103,12 @@ def test_no_area_has_no_label():
 
 @contextmanager
 def two_rooms_shown(folder):
-    """Yield a page that shows a map of two rooms, and who published the map."""
     with (
-        daemon_process(folder, mission={"autostart": False}) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(folder, mission={"autostart": False}) as (daemon, outsider),
         served(folder, daemon.endpoint, "--allow-commands") as page,
         browsing(page.url, folder / "browser") as tab,
     ):
-        outsider.put("map", map_bytes(two_rooms(door=True)))
-        outsider.put("pose", pose_bytes(1.05, 1.05))
+        show_room(outsider, two_rooms(door=True), 1.05, 1.05)
         until(lambda: tab.js("foundRooms().length") == 2 and tab.js("Boolean(model.map)"))
         yield tab, outsider
 
@@ -174,7 +170,6 @@ def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
 
 
 def order_both(tab: Tab, outsider: Outsider) -> None:
-    """Order the picked bath, then the kitchen: in the order of the taps, each as it is set."""
     tab.click("chooseroom")
     tap(tab, 1.05, 2.5)
     tab.click("chooseroom")
@@ -201,13 +196,11 @@ def order_both(tab: Tab, outsider: Outsider) -> None:
 
 
 def is_said_in_view(tab: Tab) -> bool:
-    """Tell whether all of an answer is on the screen, wherever the page is scrolled to."""
     tops = (0, 9_999)
     return all(tab.js(f"scrollTo(0, {top}); {IN_VIEW}") for top in tops)
 
 
 def tap(tab: Tab, x: float, y: float) -> None:
-    """Tap on a room, until its card is shown."""
     tab.js("canvas.scrollIntoView()")
     tab.touch(tab.on_screen(x, y))
     until(lambda: tab.js("find('room').offsetParent !== null"))

@@ -36,7 +36,7 @@ from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS, LiveServer
 from fasaco_edge.wire.keys import Keys
 from tests.serve.serving import Served, listens, looking, served
-from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.outsider import TIMEOUT_S, Outsider, joined_daemon
 from tests.support.processes import (
     Daemon,
     daemon_process,
@@ -44,7 +44,7 @@ from tests.support.processes import (
     free_endpoint,
     mapped_files,
 )
-from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes, update_bytes
+from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes, show_room, update_bytes
 from tests.support.waiting import until
 
 # Memory of its own at most, without pages of files [MB].
@@ -53,13 +53,11 @@ ROOM = {"name": "by the door", "polygon": [[0.5, 0.5], [3.0, 0.5], [3.0, 3.0], [
 
 
 def is_told(said: dict[str, Any]) -> bool:
-    """Return whether a state is that of the robot here; as that does not move, later degraded."""
     return said.get("state") in ("covering", "degraded")
 
 
 @pytest.fixture(scope="module")
 def covering(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A daemon whose robot is on its way, with a zone and a keep-out of its own."""
     mission = {
         "zones": [{"name": "corner", "polygon": [[3, 3], [5, 3], [5, 4], [3, 4]]}],
         "keep_out": [[[4, 1], [4.5, 1], [4.5, 1.5], [4, 1.5]]],
@@ -72,7 +70,6 @@ def covering(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 
 @pytest.fixture(scope="module")
 def page(covering: Daemon, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """Its page, to look only."""
     with served(tmp_path_factory.mktemp("page"), covering.endpoint) as running:
         yield running
 
@@ -191,8 +188,7 @@ def test_a_mission_is_run_from_the_page(tmp_path):
             looking(page) as looker,
         ):
             assert looker.wait("welcome")["role"] == "operator"
-            outsider.put("map", map_bytes(HALL))
-            outsider.put("pose", pose_bytes(*lanes(1)[0]))
+            show_room(outsider, HALL, *lanes(1)[0])
             outsider.wait_status(lambda status: status["state"] == "idle")
             looker.wait("state", lambda state: state.get("state"))
             keep_out = [[2.0, 2.0], [2.4, 2.0], [2.4, 2.4], [2.0, 2.4]]
@@ -358,7 +354,6 @@ def test_a_call_from_two_origins_is_refused_in_order(page):
 
 
 def can_look(page: Served) -> bool:
-    """Tell whether there is room for a viewer."""
     try:
         with looking(page) as looker:
             return bool(looker.wait("welcome"))
@@ -369,8 +364,7 @@ def can_look(page: Served) -> bool:
 def test_a_hanging_viewer_is_dropped_and_blocks_no_other(tmp_path):
     random = np.random.default_rng(1)
     with (
-        daemon_process(tmp_path) as daemon,
-        Outsider(daemon.endpoint) as outsider,
+        joined_daemon(tmp_path) as (daemon, outsider),
         served(tmp_path, daemon.endpoint) as page,
         looking(page) as looker,
     ):
@@ -395,13 +389,11 @@ def test_a_hanging_viewer_is_dropped_and_blocks_no_other(tmp_path):
 
 
 def is_of(pixels: np.ndarray) -> Callable[[Any], bool]:
-    """Return what tells whether a message shows this map."""
     marks = np.where(pixels == 100, 2, np.where(pixels == 0, 1, 0)).astype(np.uint8)
     return lambda message: message["body"] == marks.tobytes()
 
 
 def upgrade(page: Served, *more: str) -> bytes:
-    """Return what a browser asks for a WebSocket with; ``more`` are headers."""
     key = base64.b64encode(b"0123456789abcdef").decode()
     lines = (
         "GET /live HTTP/1.1",
@@ -415,7 +407,6 @@ def upgrade(page: Served, *more: str) -> bytes:
 
 
 def opened(page: Served) -> socket.socket:
-    """Return the socket of a viewer that says nothing."""
     host, _, port = page.address.rpartition(":")
     silent = socket.create_connection((host, int(port)), TIMEOUT_S)
     silent.sendall(upgrade(page))
@@ -424,7 +415,6 @@ def opened(page: Served) -> socket.socket:
 
 
 def hanging(page: Served) -> socket.socket:
-    """Return a viewer's socket that says hello and reads nothing."""
     host, _, port = page.address.rpartition(":")
     hung = socket.socket()
     hung.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -466,7 +456,6 @@ class SilentBrowser:
         self.heard: list[str] = []
 
     async def send(self, message: str) -> None:
-        """Take a message in."""
         self.heard.append(json.loads(message)["kind"])
 
     async def __aiter__(self) -> AsyncIterator[str]:

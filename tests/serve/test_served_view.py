@@ -23,12 +23,10 @@ CORNERS = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
 
 
 def tell(view: ServedView, topic: str, document: Any, now: float, key: str = "") -> None:
-    """Let a document come."""
     view.take(topic, Sample(key, encode_json(document)), now)
 
 
 def heard(view: ServedView, kind: str, now: float) -> Any:
-    """Return the message of a kind that is news now; None where there is none."""
     message = view.news(now).get(kind)
     return json.loads(message) if isinstance(message, str) else message
 
@@ -179,7 +177,6 @@ def test_an_unreadable_path_attachment_is_only_an_event():
 
 
 def walk_of(view: ServedView, steps: int, now: float, **more: Any) -> dict[str, Any]:
-    """Let a path of so many steps come, 0 to stand, and a status; return what is shown then."""
     revision, count = steps + 1, steps + 1 if steps else 0
     xy = np.stack([np.arange(count, dtype=float), np.zeros(count)], axis=-1)
     note = encode_json({"revision": revision, "steps": steps, "reason": "test"})

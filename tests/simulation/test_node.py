@@ -40,8 +40,6 @@ def new_world():
 
 
 class Planner:
-    """What a planner sees and says: maps and poses come in, paths go out."""
-
     def __init__(self, robot):
         self.endpoint, self.keys = free_endpoint(), Keys(robot)
         self.maps, self.poses, self.reports = [], [], []
@@ -51,7 +49,6 @@ class Planner:
         self._path = self.bus.advertise(self.keys, topics.PATH)
 
     def run(self, world, is_done, **options):
-        """Run the robot until a condition holds, or for a minute."""
         settings, ends = BusSettings(connect=(self.endpoint,)), time.monotonic() + 60.0
         run_simulation(
             world, self.keys, settings, **options, report=self.reports.append,
@@ -226,7 +223,6 @@ def test_it_waits_for_a_bus_that_is_not_there_yet():
 
 
 def ticks_until(pace, begin_s, end_s, cost_s):
-    """Run ticks that take ``cost_s`` each, as soon as they are due."""
     now_s, count = begin_s, 0
     while now_s < end_s:
         if pace.behind_s(now_s) >= 0.0:

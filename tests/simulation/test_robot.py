@@ -119,7 +119,6 @@ def clear(_start, _end):
 
 
 def track(*corners):
-    """A track over some corners, a point every 2 cm."""
     points = [np.asarray(corners[0], float)[np.newaxis]]
     for begin, end in pairwise(corners):
         count = max(1, round(np.hypot(*np.subtract(end, begin)) / 0.02))

@@ -9,13 +9,16 @@ import json
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Self
 
 import zenoh
 import zenoh.ext
 
+from tests.support.processes import Daemon, daemon_process
 from tests.support.waiting import until
 
 # Time limit [s]; only a very busy machine needs most of it.
@@ -149,6 +152,16 @@ class Outsider:
         """Return whether the daemon's liveliness token exists."""
         replies = self.session.liveliness().get(f"{self.prefix}/alive", timeout=timeout_s)
         return any(reply.ok is not None for reply in replies)
+
+
+@contextmanager
+def joined_daemon(folder: Path, *words: str, **sections: Any) -> Iterator[tuple[Daemon, Outsider]]:
+    """Run a daemon, see ``daemon_process``, and an outsider on its bus."""
+    with (
+        daemon_process(folder, *words, **sections) as daemon,
+        Outsider(daemon.endpoint) as outsider,
+    ):
+        yield daemon, outsider
 
 
 def open_client(endpoint: str, transport: Mapping[str, Any] | None = None) -> zenoh.Session:

@@ -159,11 +159,15 @@ def drive(outsider: Outsider, points: list[tuple[float, float]]) -> dict[str, An
     )
 
 
+def show_room(outsider: Outsider, pixels: Pixels, *pose: float) -> None:
+    """Publish a map and a pose, see ``pose_bytes``."""
+    outsider.put("map", map_bytes(pixels))
+    outsider.put("pose", pose_bytes(*pose))
+
+
 def begin(outsider: Outsider, pixels: Pixels = HALL, at: int = 0) -> dict[str, Any]:
     """Publish map and pose; return a status of the robot on a path."""
-    place = lanes(at + 1)[at]
-    outsider.put("map", map_bytes(pixels))
-    outsider.put("pose", pose_bytes(*place))
+    show_room(outsider, pixels, *lanes(at + 1)[at])
     outsider.wait_status(lambda status: status["state"] in ("covering", "done"))
     return outsider.wait_status(lambda status: status["coverage"]["covered"] > 0)
 

@@ -32,7 +32,6 @@ def grid_of(
 
 
 def console(width: int = 80, *, colours: str | None = "truecolor") -> Console:
-    """Return a console that asks neither the terminal nor the environment."""
     environ = {"TERM": "xterm", "COLUMNS": str(width), "LINES": "24"}
     kind: Any = colours
     return Console(
@@ -41,18 +40,15 @@ def console(width: int = 80, *, colours: str | None = "truecolor") -> Console:
 
 
 def plain(line: str) -> str:
-    """Return what is seen of a line."""
     return ESCAPE.sub("", line)
 
 
 def tell(view: RobotView, topic: str, payload: bytes, attachment: bytes = b"") -> None:
-    """Let a sample come."""
     schema = POSE_STAMPED if topic == "pose" else ""
     view.take(topic, Sample(topic, payload, schema, attachment), NOW)
 
 
 def status(**members: Any) -> bytes:
-    """Return a status as a daemon writes it."""
     coverage = {"coverable": 40, "covered": 10, "recovered": 3, "remaining": 30}
     path = {"revision": 7, "reason": "map: 2 cells more", "steps": 30, "remaining_steps": 30}
     plan = {"planned_steps": 30, "lower_bound_steps": 29, "gap": 0.0345}
@@ -71,7 +67,6 @@ def status(**members: Any) -> bytes:
 
 
 def mid_mission() -> RobotView:
-    """Return what is known of a robot in a room of 6 x 4 m: on its way east, then north."""
     view = RobotView("robot")
     view.take("token", Token("robot", here=True), NOW)
     room = np.zeros((40, 60), np.int8)

@@ -12,15 +12,18 @@ from tests.support.processes import ENVIRONMENT, PROGRAM
 
 
 class Terminal(terminal.Terminal):
-    """A terminal with ``watch`` in it."""
-
     def __init__(self, *words: str, **options: Any) -> None:
         super().__init__("watch", *words, **options)
+
+    def quit(self) -> None:
+        """Quit by a key; the terminal must be as it was before."""
+        self.type("q")
+        assert self.end() == 0
+        assert self.is_clean()
 
 
 @contextmanager
 def piped(*words: str) -> Iterator[subprocess.Popen[str]]:
-    """Run ``watch`` into pipes; whatever happens meanwhile, it is over afterwards."""
     with subprocess.Popen(
         [*PROGRAM, "watch", *words],
         stdout=subprocess.PIPE,

@@ -25,7 +25,6 @@ SIZES = [(80, 24), (120, 40), (200, 60), (64, 14), (63, 13), (30, 10), (12, 4), 
 
 
 def page_of(view: RobotView, width: int = 80, height: int = 24, colours: str | None = None) -> str:
-    """Return what is seen."""
     lines = Page(console(width, colours=colours)).lines(view, NOW, width, height)
     return "\n".join(plain(line) for line in lines)
 

@@ -33,12 +33,7 @@ def test_south_is_at_the_bottom():
     kinds = picture.ground(
         frame, grid_of([[100, 100, 100], [0, 0, 100], [0, 0, 0], [-1] * 3]), None
     )
-    assert kinds.tolist() == [
-        [UNKNOWN] * 3,
-        [FLOOR] * 3,
-        [FLOOR, FLOOR, WALL],
-        [WALL] * 3,
-    ]
+    assert kinds.tolist() == [[UNKNOWN] * 3, [FLOOR] * 3, [FLOOR, FLOOR, WALL], [WALL] * 3]
 
 
 def test_a_thin_wall_stays_however_small_the_picture():

@@ -16,14 +16,8 @@ import pytest
 from fasaco_edge.host.processes import own_mb
 from fasaco_edge.watch.live import Screen
 from tests.support.outsider import Outsider
-from tests.support.processes import (
-    Daemon,
-    daemon_process,
-    fasaco_edge,
-    free_endpoint,
-    mapped_files,
-)
-from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes
+from tests.support.processes import Daemon, daemon_process, fasaco_edge, free_endpoint, mapped_files
+from tests.support.rooms import HALL, begin, lanes, pose_bytes, show_room
 from tests.watch.terminal import Terminal, piped
 
 # Memory of its own at most, without pages of files [MB].
@@ -32,7 +26,6 @@ WATCH_MB = 30.0
 
 @pytest.fixture(scope="module")
 def covering(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A daemon whose robot is on its way; map and pose are of an outsider who has gone."""
     with daemon_process(tmp_path_factory.mktemp("daemon")) as running:
         with Outsider(running.endpoint) as outsider:
             begin(outsider)
@@ -55,9 +48,7 @@ def test_it_shows_how_the_mission_stands(covering):
         assert resident < WATCH_MB
         mapped = mapped_files(terminal.process.pid)
         assert [name for name in ("numba", "llvmlite", "rerun", "PIL") if name in mapped] == []
-        terminal.type("q")
-        assert terminal.end() == 0
-        assert terminal.is_clean()
+        terminal.quit()
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
@@ -82,9 +73,7 @@ def test_ctrl_z_gives_the_terminal_back_for_a_while(covering):
         terminal.process.send_signal(signal.SIGCONT)
         terminal.wait_text("COVERING")
         assert not terminal.is_clean()
-        terminal.type("q")
-        assert terminal.end() == 0
-        assert terminal.is_clean()
+        terminal.quit()
 
 
 def test_a_page_is_limited_whatever_size_the_terminal_reports():
@@ -110,22 +99,18 @@ def test_it_outlives_the_daemon(tmp_path):
         with daemon_process(tmp_path, bus=bus) as first, Outsider(endpoint) as outsider:
             begin(outsider)
             terminal.wait_text("COVERING")
-            first.process.send_signal(signal.SIGKILL)
-            first.process.wait()
+            first.kill()
         screen = terminal.wait_text("waiting for it to return")
         assert "the daemon is gone" in screen
         with daemon_process(tmp_path, bus=bus):
             terminal.wait_text("WAITING FOR MAP")
             terminal.wait_text("the daemon is back")
             with Outsider(endpoint) as outsider:
-                outsider.put("map", map_bytes(HALL))
-                outsider.put("pose", pose_bytes(*lanes(1)[0]))
+                show_room(outsider, HALL, *lanes(1)[0])
                 terminal.wait_text("COVERING")
         # What Zenoh's threads still do while the daemon is away must not abort it.
         terminal.wait_text("the daemon has been gone")
-        terminal.type("q")
-        assert terminal.end() == 0
-        assert terminal.is_clean()
+        terminal.quit()
 
 
 def test_it_draws_no_more_often_than_ten_times_a_second(covering):
@@ -199,9 +184,7 @@ def test_a_host_that_accepts_but_never_answers_blocks_no_command():
         assert time.monotonic() - began < 120.0
         with Terminal("--connect", endpoint) as terminal:
             terminal.wait_text("waiting for a daemon")
-            terminal.type("q")
-            assert terminal.end() == 0
-            assert terminal.is_clean()
+            terminal.quit()
 
 
 def test_once_without_a_daemon_is_an_error(covering):

@@ -54,7 +54,6 @@ def load(name: str) -> Any:
 
 
 def key_entry(topic: Topic) -> dict[str, Any]:
-    """Return what ``keys.yaml`` says of a topic."""
     is_token = topic.qos is None
     return {
         "name": topic.name,
@@ -76,7 +75,6 @@ def key_entry(topic: Topic) -> dict[str, Any]:
 
 
 def query_entry(query: Query) -> dict[str, Any]:
-    """Return what ``keys.yaml`` says of a query."""
     return {
         "name": query.name,
         "key": PREFIX + query.suffix,
@@ -90,7 +88,6 @@ def query_entry(query: Query) -> dict[str, Any]:
 
 
 def qos_entry(topic: Topic) -> dict[str, Any]:
-    """Return what ``qos.yaml`` says of a topic."""
     qos = QOS[topic.name]
     blocked = f"the {topic.speaker}, 5 s; the daemon takes each sample in at once"
     return {
@@ -204,7 +201,6 @@ def template_grants() -> dict[str, list[access.Grant]]:
 
 
 def with_keys(template: str, grants: Sequence[access.Grant]) -> str:
-    """Return a session template with the key expressions that the table of topics gives it."""
     rules = access.access_control(grants, "usernames")["rules"]
     limits = access.limits(grants[-1].prefix, access.SenderLimits())
     found = {rule["id"]: rule["key_exprs"] for rule in (*rules, *limits["low_pass_filter"])}
@@ -235,7 +231,6 @@ def with_keys(template: str, grants: Sequence[access.Grant]) -> str:
 
 
 def write() -> None:
-    """Write all files that are made from the table of topics, and the schemas."""
     make_schemas.write(PROTOCOL / "schema")
     keys = PROTOCOL / "keys.yaml"
     head, _, rest = keys.read_text().partition("\nkeys:\n")

@@ -16,7 +16,6 @@ from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 
 def placed(geometry: GridGeometry) -> dict[str, Any]:
-    """Return what an index says of where a grid lies."""
     origin = geometry.origin
     return {
         "rows": geometry.rows,
@@ -27,7 +26,6 @@ def placed(geometry: GridGeometry) -> dict[str, Any]:
 
 
 def facts_of(message: Any) -> dict[str, Any]:
-    """Return what an index says of a message."""
     if isinstance(message, tuple):
         poses = [transform.planar() for transform in message]
         return {
@@ -63,7 +61,6 @@ def facts_of(message: Any) -> dict[str, Any]:
 
 
 def check_facts(said: dict[str, Any], facts: dict[str, Any]) -> None:
-    """Check that what is said of a message are these facts."""
     assert said.keys() == facts.keys(), said
     for name, value in facts.items():
         if isinstance(value, list) and all(isinstance(leaf, int | float) for leaf in _flat(value)):
@@ -74,7 +71,6 @@ def check_facts(said: dict[str, Any], facts: dict[str, Any]) -> None:
 
 
 def _flat(value: Any) -> list[Any]:
-    """Return the leaves of nested lists, in order."""
     if not isinstance(value, list):
         return [value]
     return [leaf for item in value for leaf in _flat(item)]

@@ -54,14 +54,12 @@ DOCUMENTS = _documents()
 
 
 def files() -> dict[str, str]:
-    """Return every file in protocol/schema, by its name there."""
     made = {f"{name}.json": schema_of(kind) for name, kind in DOCUMENTS.items()}
     made["config.json"] = config_schema()
     return {name: json.dumps(HEAD | made[name], indent=2) + "\n" for name in sorted(made)}
 
 
 def schema_of(kind: type[msgspec.Struct]) -> dict[str, Any]:
-    """Return the JSON Schema of a document."""
     schema = msgspec.json.schema(kind, schema_hook=lambda _: {"$comment": "any value"})
     for struct in structs_in(kind):
         _complete(schema["$defs"][struct.__name__], struct)
@@ -85,7 +83,6 @@ def config_schema() -> dict[str, Any]:
 
 
 def structs_in(kind: type[msgspec.Struct]) -> set[type[msgspec.Struct]]:
-    """Return a struct and all those in its members."""
     found = {kind}
     for field in msgspec.structs.fields(kind):
         for inner in _structs_of(field.type):
@@ -124,7 +121,6 @@ def _summary(struct: type[msgspec.Struct]) -> str:
 
 
 def descriptions(docstring: str) -> dict[str, str]:
-    """Return what a docstring says of each attribute."""
     listed = inspect.cleandoc(docstring).partition("Attributes:\n")[2].partition("\n\n")[0]
     found: dict[str, str] = {}
     for entry in re.split(r"\n(?=    \S)", listed) if listed else ():
@@ -135,6 +131,5 @@ def descriptions(docstring: str) -> dict[str, str]:
 
 
 def write(into: Path) -> None:
-    """Write all files to ``into``."""
     for name, content in files().items():
         (into / name).write_text(content)

@@ -33,7 +33,6 @@ def seeds_of(schema: str) -> list[bytes]:
 
 
 def mutant(rng: random.Random, seeds: Sequence[bytes]) -> bytes:
-    """Return one of ``seeds``, damaged once or a few times."""
     payload = bytearray(rng.choice(seeds))
     for mutate in rng.choices(MUTATIONS, k=rng.choice((1, 1, 1, 2, 3))):
         if len(payload) > 16:

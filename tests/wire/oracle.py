@@ -25,33 +25,27 @@ FRAMES = ("", "m", "ma", "map", "odom", "robot1", "robot1/map", "FuÃŸboden", "åœ
 
 
 def to_bytes(schema: str, message: object) -> bytes:
-    """Return ``message`` in little-endian CDR."""
     return bytes(STORE.serialize_cdr(message, schema, little_endian=True))
 
 
 def from_bytes(schema: str, payload: bytes) -> Any:
-    """Return the message in ``payload``."""
     return STORE.deserialize_cdr(payload, schema)
 
 
 def make(schema: str, **fields: object) -> Any:
-    """Return a message of type ``schema``."""
     return STORE.types[schema](**fields)
 
 
 def time(stamp_ns: int) -> Any:
-    """Return a builtin_interfaces/Time."""
     sec, nanosec = divmod(stamp_ns, SECOND_NS)
     return make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
 
 
 def header(frame: str, stamp_ns: int) -> Any:
-    """Return a std_msgs/Header."""
     return make("std_msgs/msg/Header", stamp=time(stamp_ns), frame_id=frame)
 
 
 def pose(where: Pose2D) -> Any:
-    """Return a geometry_msgs/Pose."""
     sin, cos = float(np.sin(where.yaw / 2)), float(np.cos(where.yaw / 2))
     return make(
         "geometry_msgs/msg/Pose",
@@ -61,7 +55,6 @@ def pose(where: Pose2D) -> Any:
 
 
 def occupancy_grid(frame: str, stamp_ns: int, geometry: GridGeometry, cells: Any) -> Any:
-    """Return a nav_msgs/OccupancyGrid."""
     info = make(
         "nav_msgs/msg/MapMetaData",
         map_load_time=time(stamp_ns),
@@ -75,7 +68,6 @@ def occupancy_grid(frame: str, stamp_ns: int, geometry: GridGeometry, cells: Any
 
 
 def update(frame: str, stamp_ns: int, corner: tuple[int, int], cells: Any) -> Any:
-    """Return a map_msgs/OccupancyGridUpdate with its corner at (column, row)."""
     return make(
         schemas.OCCUPANCY_GRID_UPDATE,
         header=header(frame, stamp_ns),
@@ -88,17 +80,14 @@ def update(frame: str, stamp_ns: int, corner: tuple[int, int], cells: Any) -> An
 
 
 def pose_stamped(frame: str, stamp_ns: int, where: Any) -> Any:
-    """Return a geometry_msgs/PoseStamped."""
     return make(schemas.POSE_STAMPED, header=header(frame, stamp_ns), pose=where)
 
 
 def pose_with_covariance(where: Any, covariance: Any) -> Any:
-    """Return a geometry_msgs/PoseWithCovariance."""
     return make("geometry_msgs/msg/PoseWithCovariance", pose=where, covariance=covariance)
 
 
 def pose_with_covariance_stamped(frame: str, stamp_ns: int, where: Any, covariance: Any) -> Any:
-    """Return a geometry_msgs/PoseWithCovarianceStamped."""
     return make(
         schemas.POSE_WITH_COVARIANCE_STAMPED,
         header=header(frame, stamp_ns),
@@ -107,7 +96,6 @@ def pose_with_covariance_stamped(frame: str, stamp_ns: int, where: Any, covarian
 
 
 def twist(numbers: Any) -> Any:
-    """Return a geometry_msgs/Twist of linear x, y, z, angular x, y, z."""
     x, y, z, roll, pitch, yaw = (float(value) for value in numbers)
     vector = partial(make, "geometry_msgs/msg/Vector3")
     return make(schemas.TWIST, linear=vector(x=x, y=y, z=z), angular=vector(x=roll, y=pitch, z=yaw))

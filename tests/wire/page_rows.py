@@ -40,7 +40,6 @@ def role_rows() -> list[str]:
 
 
 def with_roles(page: str) -> str:
-    """Return a page with these rows."""
     for row in role_rows():
         head = "|".join(row.split("|")[:2]) + "|"
         page = re.sub(rf"^{re.escape(head)}.*$", row, page, flags=re.MULTILINE)
@@ -48,7 +47,6 @@ def with_roles(page: str) -> str:
 
 
 def members_in(page: str, heading: str) -> list[str]:
-    """Return the names in the first column of the table with this heading."""
     cells = [line.split(" | ")[0] for line in _table(page, heading).splitlines()[2:]]
     return [name for cell in cells for name in re.findall(r"`(\w+)`", cell)]
 

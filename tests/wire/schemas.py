@@ -18,7 +18,6 @@ OPEN = {"config.json"}
 
 
 def schema(name: str) -> Any:
-    """Return a schema as it stands in its file."""
     return json.loads((PROTOCOL / "schema" / name).read_text())
 
 

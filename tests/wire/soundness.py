@@ -55,7 +55,6 @@ def peak_bytes(schema: str, payload: bytes) -> int:
 
 
 def check_sound(message: Any) -> None:
-    """Check that what came through holds what the contract promises."""
     if isinstance(message, tuple):
         for transform in message:
             place = transform.planar()

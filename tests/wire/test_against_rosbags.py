@@ -18,13 +18,11 @@ REWRITTEN = ("battery_of_cells", "scan_with_intensities", "path", "pheromone")
 
 
 def headers_of(message: Any) -> list[Any]:
-    """Return all headers of a message of rosbags."""
     inner = [*getattr(message, "poses", ()), *getattr(message, "transforms", ())]
     return [part.header for part in (message, *inner) if hasattr(part, "header")]
 
 
 def places_of(message: Any) -> list[Any]:
-    """Return the positions in a path of rosbags."""
     return [part.pose.position for part in getattr(message, "poses", ())]
 
 

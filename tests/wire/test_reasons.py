@@ -13,7 +13,6 @@ from fasaco_edge.wire.reasons import WORDS, plain
 
 
 def literals(module: object) -> str:
-    """Return all text in a module's source."""
     tree = ast.walk(ast.parse(inspect.getsource(module)))
     return "".join(
         n.value for n in tree if isinstance(n, ast.Constant) and isinstance(n.value, str)

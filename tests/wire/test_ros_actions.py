@@ -59,7 +59,6 @@ class Definitions:
         self.store.fielddefs[name] = (list(constants), list(fields))
 
     def service(self, name, request, response):
-        """Return the hash of a service."""
         self.put(f"{name}_Request", request)
         self.put(f"{name}_Response", response)
         both = {part: named(f"{name}_{part.title()}") for part in ("request", "response")}

@@ -8,7 +8,7 @@ import pytest
 import zenoh
 import zenoh.ext
 
-from fasaco_edge.config.ros import RosConfig
+from fasaco_edge.config.ros import ROS_TOPICS, RosConfig
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.ros_keys import (
     GID_BYTES,
@@ -20,7 +20,6 @@ from fasaco_edge.wire.ros_keys import (
     attachment,
     gid_of,
 )
-from fasaco_edge.wire.ros_topics import ROS_TOPICS
 from tests.wire import oracle
 from tests.wire.contract_files import CONTRACT, load
 

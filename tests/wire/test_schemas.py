@@ -37,7 +37,6 @@ def test_every_schema_has_a_use():
 
 
 def struct(file: str, name: str) -> dict[str, Any]:
-    """Return the part of a schema that a struct makes."""
     return schema(file)["$defs"][name]
 
 

@@ -22,7 +22,7 @@ from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.messages.poses import decode_pose
-from tests.support.outsider import Outsider
+from tests.support.outsider import Outsider, joined_daemon
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room
 from tests.wire.decoders import DECODERS
@@ -58,7 +58,6 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read(client: Path, messages: Sequence[tuple[str, bytes]]) -> list[dict[str, Any]]:
-    """Return what the client says of each message."""
     sent = b"".join(f"{kind} {len(payload)}\n".encode() + payload for kind, payload in messages)
     ended = subprocess.run([str(client)], input=sent, capture_output=True, check=False)
     assert (ended.returncode, ended.stderr) == (0, b"")
@@ -152,7 +151,7 @@ def test_poses_that_would_be_refused_are_not_written(client: Path, words: Any) -
 
 def test_a_live_path_is_read(client: Path, tmp_path: Path) -> None:
     """A daemon gets its pose from the client, which then reads path and status off the bus."""
-    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
+    with joined_daemon(tmp_path) as (daemon, outsider):
         outsider.put("map", map_bytes(pillared_room()))
         outsider.put("pose", write_pose(client, "map", "0.75", "0.75", "0").stdout)
         outsider.wait_status(lambda status: status["state"] == "covering")

@@ -59,7 +59,6 @@ def _goes_on(first: str, line: str) -> bool:
 
 
 def _laid(block: list[str], width: int) -> list[str]:
-    """Return the lines of a block for a width."""
     if all(len(line) <= width for line in block):
         return block
     first, inward, row = block[0], " " * _inward(block[0]), _ROW.match(block[0])

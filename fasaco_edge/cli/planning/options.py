@@ -285,7 +285,6 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
 
 
 def _planner(text: str) -> str:
-    """Read the name of a planner, or the place of a user's own planner."""
     if text not in PLANNER_NAMES and not is_place(text):
         names = ", ".join(PLANNER_NAMES)
         meant = suggestion(text, PLANNER_NAMES)
@@ -295,7 +294,6 @@ def _planner(text: str) -> str:
 
 
 def _end(text: str) -> str | tuple[int, int]:
-    """Read the end of the walk."""
     if text in (ANYWHERE, HOME):
         return text
     try:
@@ -307,7 +305,6 @@ def _end(text: str) -> str | tuple[int, int]:
 
 
 def _alignment(text: str) -> str | float:
-    """Read the direction of the cells' rows."""
     if text in (WALLS, AXES):
         return text
     try:

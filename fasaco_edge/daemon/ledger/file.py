@@ -271,7 +271,6 @@ def _note_of(path: Path) -> str:
 
 
 def _is_empty(path: Path) -> bool:
-    """Return whether a ledger is readable, and has nothing covered or swept."""
     with contextlib.suppress(OSError, FasacoError):
         return decode_ledger(_read(path), None).is_empty
     return False

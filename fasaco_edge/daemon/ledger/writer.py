@@ -142,7 +142,6 @@ class LedgerKeeper:
         self._kept, self._kept_at = _Kept(-1, -1, -1, -1, OrderState()), float("-inf")
 
     def _first_order_state(self, autostart: bool) -> OrderState:
-        """Return the order from before the restart, or the initial one."""
         kept = OrderState.idle(NO_ORDER)
         try:
             if self._before.note:

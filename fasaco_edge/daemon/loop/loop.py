@@ -226,7 +226,6 @@ class Loop:
         return self._ports.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
 
     def _note(self, batch: CycleInput) -> None:
-        """Note the times of plans and maps."""
         mission = self._runner.mission
         for plan in batch.plans:
             if isinstance(plan, PlanReady) and not (

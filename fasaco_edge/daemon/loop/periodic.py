@@ -8,16 +8,17 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.daemon.loop.mission_reports import room_progress, unswept
 from fasaco_edge.daemon.loop.outbox import Outbox
-from fasaco_edge.daemon.loop.room_shares import RoomShares
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.orders.passes import passes_document
 from fasaco_edge.mission.rooms.room_book import Room, RoomBook
+from fasaco_edge.mission.rooms.room_raster import RoomRaster
 from fasaco_edge.planners.living_trail import TrailSnapshot, branching, directions, strongest_into
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -227,6 +228,44 @@ OF_MISSION: dict[str, Callable[[Outbox], PeriodicMessage]] = {
     "pheromone": TrailPublisher,
 }
 """The publishers of a mission's messages, by their names in log lines about failures."""
+
+
+# Limit on the squares of floor that are counted: it bounds the time that counting takes.
+MOST_ROOM_SQUARES = 250_000
+
+
+class RoomShares:
+    """Counts the squares of floor by room; the rooms of all squares are cached."""
+
+    def __init__(self) -> None:
+        self._read_of: tuple[RoomRaster, GridGeometry] | None = None
+        self._rooms = np.zeros((0, 0), np.uint16)
+
+    def of(self, mission: Mission) -> dict[int, float]:
+        """Return the swept share of the floor in reach in each room, by the room's number.
+
+        The share is of the whole room, whatever the order asks for there. Rooms without such floor
+        are left out; so are all rooms if only cells are counted, and in a fleet, as the floor that
+        others sweep is unknown.
+        """
+        sheet, floor = mission.rooms.sheet, mission.line.floor_in_reach(MOST_ROOM_SQUARES)
+        if sheet is None or floor is None or mission.company.has_members:
+            return {}
+        squares, within, swept = floor
+        rooms = self._on(sheet.raster, mission.rotation.geometry(squares))
+        count = np.bincount(rooms[within]).tolist()
+        done = np.bincount(rooms[swept], minlength=len(count)).tolist()
+        return {room: done[room] / count[room] for room in range(1, len(count)) if count[room]}
+
+    def _on(self, raster: RoomRaster, squares: GridGeometry) -> NDArray[np.uint16]:
+        """Return the room of each square, uint16 (rows, cols), 0 for none."""
+        known = self._read_of
+        if known is None or known[0] is not raster or known[1] != squares:
+            rows, cols = np.mgrid[0.5 : squares.rows, 0.5 : squares.cols]
+            x, y = squares.to_map(cols.ravel(), rows.ravel())
+            self._read_of = raster, squares
+            self._rooms = raster.at(np.column_stack((x, y))).reshape(squares.rows, squares.cols)
+        return self._rooms
 
 
 class RoomsPublisher:

@@ -172,7 +172,6 @@ class TurnLog:
 
     @property
     def _is_waiting(self) -> bool:
-        """Whether there has been no subscriber yet."""
         return self._embed_until == float("inf")
 
     def end(self, why: str) -> None:

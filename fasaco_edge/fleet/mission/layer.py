@@ -116,7 +116,6 @@ class FleetLayer(Company):
         return joint, open_cells(joint.lattice.window) & joint.reachable
 
     def _joint(self, area: ReachableArea) -> ReachableArea:
-        """Return the joint area as of the last check."""
         if self._seen is None or self._seen[0] is not area:
             self._seen = area, self.others.ground.joint(area)
         return self._seen[1]
@@ -157,10 +156,7 @@ class FleetLayer(Company):
             self.numbers.follow(newer)
             self._division = Division.of(newer.parts)
         else:
-            robots = [
-                Robot(self._robot, cell, self.step_s),
-                *self.numbers.in_reach(joint, now),
-            ]
+            robots = [Robot(self._robot, cell, self.step_s), *self.numbers.in_reach(joint, now)]
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
             robots += self.numbers.unseen(before, joint.lattice, robots, self._divided_at, now)
@@ -259,7 +255,6 @@ class FleetLayer(Company):
         return "others have swept cells of this robot's part"
 
     def _count_taken(self) -> int:
-        """Return the number of this robot's cells that only others have swept."""
         self._counted = self._ledger.shared.version
         area = self._map.area
         if area is None:

@@ -13,14 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.fleet.observer.cells import (
-    FAR,
-    MOST_SPAN,
-    Seat,
-    distances,
-    mask_of,
-    window_of,
-)
+from fasaco_edge.fleet.observer.cells import FAR, MOST_SPAN, Seat, distances, mask_of, window_of
 from fasaco_edge.fleet.observer.observed import MOST_MEMBERS, ObservedFleet, ObservedRobot
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.wire.documents.fleet import TILE

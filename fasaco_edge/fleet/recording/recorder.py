@@ -33,12 +33,7 @@ from fasaco_edge.fleet.recording.scene import FleetScene
 from fasaco_edge.host.processes import memory_limit
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import NO_MAP
-from fasaco_edge.recording.write.process import (
-    BusRecorder,
-    afforded_bytes,
-    begin_recording,
-    record,
-)
+from fasaco_edge.recording.write.process import BusRecorder, afforded_bytes, begin_recording, record
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of

@@ -17,11 +17,7 @@ from fasaco_edge.fleet.observer.cells import mask_of, window_of
 from fasaco_edge.fleet.observer.observed import GONE, ObservedFleet, ObservedRobot
 from fasaco_edge.fleet.observer.queues import LEAST_SHARING
 from fasaco_edge.fleet.observer.survey import Survey, survey_of
-from fasaco_edge.fleet.recording.layout import (
-    build_layout,
-    card_of,
-    robot_entity,
-)
+from fasaco_edge.fleet.recording.layout import build_layout, card_of, robot_entity
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D, union_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser, known_bounds
 from fasaco_edge.recording import entities
@@ -50,17 +46,11 @@ PATH_Z, TRACK_Z, LABEL_Z = 0.05, 0.04, 0.1
 TRACK_SPACING_M = 0.05
 MOST_TRACK = 4_000
 METRICS = ("swept_m2", "left_cells")
-STATES = {
-    **draw.STATES[entities.MISSION_STATE],
-    "waiting": 0xDB2777FF,
-    GONE: 0x111827FF,
-}
+STATES = {**draw.STATES[entities.MISSION_STATE], "waiting": 0xDB2777FF, GONE: 0x111827FF}
 
 
 @dataclass(slots=True)
 class _RobotDrawings:
-    """Drawings of a robot."""
-
     state: str = ""
     known: Bounds | None = None
     track: list[tuple[float, float]] = field(default_factory=list)

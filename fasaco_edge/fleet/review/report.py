@@ -19,15 +19,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.fleet.observer.cells import (
-    FAR,
-    Cells,
-    Place,
-    Seat,
-    distances,
-    mask_of,
-    window_of,
-)
+from fasaco_edge.fleet.observer.cells import FAR, Cells, Place, Seat, distances, mask_of, window_of
 from fasaco_edge.fleet.recording.notes import Note, read_notes
 from fasaco_edge.fleet.review.tracks import RobotTrack, seat_of, seconds_of, tracks_of
 from fasaco_edge.grid.geometry import Window

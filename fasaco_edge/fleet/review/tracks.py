@@ -150,7 +150,6 @@ def swept_by_others(
 
 
 def _members(turns: Iterable[Arrival], fleet: str) -> list[ObservedRobot]:
-    """Return the other robots as of their last messages."""
     members: dict[str, ObservedRobot] = {}
     decoder = SampleDecoder()
     for arrival in turns:

@@ -102,8 +102,6 @@ def short(text: str) -> str:
 
 @dataclass(slots=True)
 class _RobotNews:
-    """Data of a robot besides its fleet messages."""
-
     status: Status | None = None
     noted: str = ""
     noted_at: float = -math.inf

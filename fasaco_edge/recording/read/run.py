@@ -240,8 +240,6 @@ def read_clock(paths: Sequence[Path]) -> RobotClock:
 
 @dataclass(slots=True)
 class _RunReader:
-    """Collects the content of the parts."""
-
     ids: dict[str, Path] = field(default_factory=dict)
     parts: list[PartFile] = field(default_factory=list)
     span: list[int] = field(default_factory=list)
@@ -292,7 +290,6 @@ class _RunReader:
         return chunk.bytes
 
     def record(self) -> RunRecord:
-        """Return the record, in order of time."""
         if len(self.ids) > 1:
             raise DifferentRuns(
                 "these are parts of different runs: "

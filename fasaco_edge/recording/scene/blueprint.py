@@ -70,11 +70,7 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin=f"/{entities.WORLD}",
         name="Pheromone that ants follow (bright: much), and the path of that time (white)",
-        contents=[
-            f"/{entities.PHEROMONE}/**",
-            f"/{entities.PATH}",
-            f"/{entities.ROBOT}/**",
-        ],
+        contents=[f"/{entities.PHEROMONE}/**", f"/{entities.PATH}", f"/{entities.ROBOT}/**"],
         eye_controls=eye_above(bounds, PHEROMONE_ASPECT),
         line_grid=False,
         background=PHEROMONE_BACKGROUND,
@@ -102,7 +98,6 @@ def plot_view(plot: Plot, contents: Sequence[str]) -> rrb.TimeSeriesView:
 
 
 def _curves_view(plot: Plot) -> rrb.TimeSeriesView:
-    """Return the view of a plot, with its curves."""
     return plot_view(plot, [f"/{curve.entity}" for curve in CURVES if curve.plot is plot])
 
 

@@ -26,7 +26,7 @@ from pathlib import Path
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.host.processes import release_unused, return_soon, stop_event
+from fasaco_edge.host.processes import MB, release_unused, return_soon, stop_event
 from fasaco_edge.recording.read.torn import repair_folder
 from fasaco_edge.recording.sdk import rrb
 from fasaco_edge.recording.write.quota import DiskBudget, cannot_record, next_run
@@ -60,7 +60,6 @@ class RunClock:
         return Arrival(topic, sample, at_ns, self._offset_ns + at_ns)
 
 
-MB = 1_000_000
 BASE_BYTES = 145 * MB
 COPIES = 15
 # Queue size without a memory limit [bytes]: maps of up to 32 million pixels.

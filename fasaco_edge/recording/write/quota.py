@@ -19,8 +19,8 @@ from pathlib import Path
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.durable import file_in_place_of
+from fasaco_edge.host.processes import MB
 
-MEGABYTE = 1_000_000
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
 # Upper limit of a run's number; a file with a larger number is not from a recorder.
 MOST_RUNS = 900_000_000
@@ -169,9 +169,9 @@ def budget_of(config: DaemonConfig, folder: Path, name: str = "") -> DiskBudget:
         )
     return DiskBudget(
         folder,
-        limits.part_mb * MEGABYTE,
-        limits.least_free_mb * MEGABYTE,
+        limits.part_mb * MB,
+        limits.least_free_mb * MB,
         60.0 * limits.part_min,
         robot,
-        limits.quota_mb * MEGABYTE,
+        limits.quota_mb * MB,
     )

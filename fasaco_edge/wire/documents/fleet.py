@@ -121,8 +121,6 @@ class FleetMember(Document, frozen=True):
 
 
 class _Head(msgspec.Struct, frozen=True):
-    """The members common to all versions."""
-
     version: Whole
     fleet: Text
 

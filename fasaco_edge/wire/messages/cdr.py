@@ -205,20 +205,18 @@ class CdrWriter:
     """Writes fields in order, with the alignment ``CdrReader`` expects.
 
     Views are not copied before ``payload``: until then they must not change.
+
+    Attributes:
+        position: number of bytes written since the header; alignment counts from there.
     """
 
-    __slots__ = ("_parts", "_size", "message")
+    __slots__ = ("_parts", "message", "position")
 
     def __init__(self, message: str) -> None:
         """Begin a CDR message of type ``message``."""
         self.message = message
         self._parts: list[bytes | memoryview] = [ENCAPSULATION]
-        self._size = 0
-
-    @property
-    def position(self) -> int:
-        """Number of bytes written since the header; alignment counts from there."""
-        return self._size
+        self.position = 0
 
     def words(self, layout: struct.Struct, names: Sequence[str], *values: float) -> None:
         """Write 32-bit numbers, as ``CdrReader.words`` reads them; ``names`` are for errors."""
@@ -242,7 +240,7 @@ class CdrWriter:
     def view(self, values: memoryview) -> None:
         """Write the bytes of a contiguous array as they are."""
         self._parts.append(values)
-        self._size += values.nbytes
+        self.position += values.nbytes
 
     def octets(self, values: bytes) -> None:
         """Write bytes as they are."""
@@ -259,10 +257,10 @@ class CdrWriter:
         return b"".join(self._parts)
 
     def _put(self, alignment: int, packed: bytes) -> None:
-        if padding := -self._size & (alignment - 1):
+        if padding := -self.position & (alignment - 1):
             packed = bytes(padding) + packed
         self._parts.append(packed)
-        self._size += len(packed)
+        self.position += len(packed)
 
 
 def read_header(reader: CdrReader, field: str = "header") -> tuple[str, int]:

@@ -22,10 +22,10 @@ from fasaco_edge.wire.messages.cdr import (
     write_header,
     write_pose,
 )
+from fasaco_edge.wire.ros_keys import CANCEL_GOAL
 
 SEND_GOAL: Final = "nav2_msgs/action/FollowPath_SendGoal"
 GET_RESULT: Final = "nav2_msgs/action/FollowPath_GetResult"
-CANCEL_GOAL: Final = "action_msgs/srv/CancelGoal"
 
 GOAL_ID_BYTES = 16
 UNKNOWN, SUCCEEDED, CANCELED, ABORTED = 0, 4, 5, 6

@@ -20,7 +20,6 @@ FLEET = ("r1", "r10", "map")
 
 @pytest.fixture(scope="module")
 def router():
-    """A router, on loopback."""
     endpoint = free_endpoint()
     with open_bus(BusSettings("router", (), (endpoint,))):
         yield endpoint
@@ -28,7 +27,6 @@ def router():
 
 @pytest.fixture(scope="module")
 def fleet(router, tmp_path_factory):
-    """A daemon of each robot, in a process of its own, joined to the router."""
     with contextlib.ExitStack() as stack:
         for name in FLEET:
             bus = {"mode": "client", "listen": [], "connect": [router]}
@@ -39,7 +37,6 @@ def fleet(router, tmp_path_factory):
 
 @pytest.fixture
 def seats(router, fleet):
-    """An outsider at each robot's keys."""
     with contextlib.ExitStack() as stack:
         yield {name: stack.enter_context(Outsider(router, name)) for name in FLEET}
 

@@ -18,13 +18,7 @@ from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.daemon.loop.inbox import (
-    CycleInput,
-    Inbox,
-    Received,
-    make_mailbox,
-    take_batch,
-)
+from fasaco_edge.daemon.loop.inbox import CycleInput, Inbox, Received, make_mailbox, take_batch
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.fleet.daemon.exchange import TILES, FleetReceiver, FleetSender
 from fasaco_edge.fleet.mission.kind import FleetKind
@@ -163,8 +157,6 @@ def test_a_robot_that_does_not_fit_is_left_out_with_the_reason(frame, members, m
 
 
 class Listener:
-    """Keeps what is published."""
-
     def __init__(self):
         self.payloads, self.heard = [], []
 

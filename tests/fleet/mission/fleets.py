@@ -31,7 +31,6 @@ class FleetRobot(Drive):
         return self.messages.next(self.mission, MOST_TILES, MOST_TILES)
 
     def tick(self, after=1.0):
-        """Plan if asked, and drive a cell."""
         if self.request is not None:
             self.plan()
         if not self.hangs and self.walk:
@@ -88,7 +87,6 @@ class FleetDrive:
             self.tick()
 
     def left_out(self):
-        """Cells that the robots could come to and none has swept."""
         (first, *_) = self.robots.values()
         whole = reachable_cells(building(*self.rows), first.cell)
         return whole - self.swept

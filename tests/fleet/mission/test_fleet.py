@@ -13,11 +13,7 @@ from hypothesis import strategies as st
 from fasaco_edge.errors import FleetError
 from fasaco_edge.fleet.mission.layer import MANY_TAKEN
 from fasaco_edge.fleet.mission.members import GONE_S
-from fasaco_edge.fleet.mission.shared import (
-    MOST_ROBOTS,
-    MOST_TILES,
-    SharedProgress,
-)
+from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, MOST_TILES, SharedProgress
 from fasaco_edge.fleet.mission.shared_work import MOST_AHEAD
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES, SweptQueue
 from fasaco_edge.grid.geometry import Pose2D, Window
@@ -123,7 +119,6 @@ def test_a_newer_division_without_this_robot_hides_no_other():
 
 
 def sweeps_everything_again(robot):
-    """Order everything, whoever has covered it."""
     zone = {"name": "hall", "polygon": rectangle(0, 0, 12, 24)}
     return robot.command("start", {"zones": [zone]})
 
@@ -481,7 +476,6 @@ def test_repeated_or_reordered_messages_of_an_epoch_are_harmless(sweeps, data):
 
 
 def tiles_of(cells):
-    """Cells as a robot tells them."""
     ledger = CoverageLedger(1.0)
     for cell in cells:
         ledger.visit(cell)

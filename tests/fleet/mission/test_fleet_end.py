@@ -184,7 +184,6 @@ def test_a_robot_standing_without_a_part_stays_in_the_fleet():
 
 
 def heard_from_the_east(other, number, to_r1):
-    """What r2 tells, who has swept the west half and sees the whole hall."""
     seed = (6, 22) if to_r1 else (0, 0)
     return replace(
         other.report(),
@@ -230,7 +229,6 @@ def test_a_robot_waits_a_moment_for_the_map_that_shows_its_part(late_s):
 
 
 def between(first, second):
-    """Let two robots tell each other for a minute; return how many divisions they counted."""
     for _ in range(60):
         for robot in (first, second):
             robot.tick()

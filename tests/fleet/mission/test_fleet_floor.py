@@ -25,7 +25,6 @@ SHARES = np.linspace(0.0, 1.0, 21)
 
 
 def divided_by(member, number):
-    """A robot that stands in the corner, and gives all that is left to itself."""
     parts = (Part("r1", (5, 9), 1e6, 1.0), Part(member, (5, 10), 0.0, 1.0))
     return MemberReceived(
         robot=member,
@@ -42,7 +41,6 @@ def divided_by(member, number):
 
 
 def in_room():
-    """A robot, r1, in a room."""
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
     robot.mission.covered.shared.begin_epoch(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
@@ -50,7 +48,6 @@ def in_room():
 
 
 def met(robot, steps):
-    """Let a robot drive; return what another one tells that is done, close ahead of it."""
     robot.drive(steps)
     while math.dist(robot.at, path_ahead(robot.mission)[1]) > 2 * CELL_M:
         robot.drive()
@@ -114,7 +111,6 @@ def test_a_robot_leaves_the_rest_of_a_line_without_open_floor():
 
 
 def nearest_to(line, place):
-    """Return the least distance of a line to a place."""
     points = [a + (b - a) * share for a, b in pairwise(np.array(line)) for share in SHARES]
     return min(math.dist(point, place) for point in points)
 
@@ -148,8 +144,6 @@ def test_a_yielding_robot_comes_no_nearer_to_a_close_one(toward):
 
 
 def around(cell):
-    """The floor of a cell, as a mask function."""
-
     def inside(window):
         rows = (np.arange(window.row0, window.row1) + 0.5) * PIXEL_M // CELL_M == cell[0]
         cols = (np.arange(window.col0, window.col1) + 0.5) * PIXEL_M // CELL_M == cell[1]
@@ -159,7 +153,6 @@ def around(cell):
 
 
 def begun():
-    """A robot, r1, that has passed cells of a room beside another one; and one of those."""
     robot = in_room()
     robot.tell(replace(divided_by("r2", 0), parts=(), by=""))
     robot.drive(40, is_checked=False)

@@ -168,8 +168,6 @@ def test_a_seed_off_the_map_counts_as_on_the_nearest_cell():
 
 
 class Robot(Drive):
-    """A robot whose map has its origin at a pose in the building."""
-
     def __init__(self, name, cell, origin, rows):
         fleet = FleetConfig("hall", "house", origin.x, origin.y, math.degrees(origin.yaw))
         tool = {"tool_width_m": CELL, "radius_m": CELL / 2}

@@ -134,7 +134,6 @@ def test_lost_ground_is_sent_as_lost():
 
 @pytest.fixture
 def members():
-    """What r1 knows of r2, which can reach more than itself."""
     ledger = MissionLedger(CELL, CELL, shared=SharedProgress())
     ledger.move_to("map")
     ledger.shared.begin_epoch(1)
@@ -191,7 +190,6 @@ def test_ground_far_away_of_a_robot_that_lies_takes_no_memory():
 
 
 def divided(robots, seeds, handicaps_s=(0.0, 0.0, 0.0)):
-    """Return the division of robots by their seeds."""
     parts = zip(robots, seeds, handicaps_s, strict=False)
     return Division.of(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in parts)
 

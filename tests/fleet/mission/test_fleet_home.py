@@ -33,7 +33,6 @@ def member(cell, **changes):
 
 @pytest.fixture
 def drive():
-    """A robot, r1, that drives home along a hall."""
     config = with_policy(CONFIG, home=at(2, 20))
     drive = Drive((2, 4), config=config, kind=FleetKind("r1"))
     drive.tell(MapReceived(building(*HALL)), pose_at(2, 4))

@@ -110,8 +110,6 @@ def test_cells_from_before_a_correction_of_the_own_map_are_void(place):
 
 
 class Listener:
-    """Keeps what a robot tells."""
-
     def put(self, payload):
         self.payload = payload
 
@@ -139,7 +137,6 @@ class OnFloors(Drive):
         self.sender.publish(self.mission, self.now)
 
     def receive(self, payload):
-        """Return why the other robot does not belong to the fleet."""
         self.tell(self.receiver.event(Sample("fasaco/@v1/r2/fleet", payload)))
         return self.mission.company.others.known["r2"].left_out
 

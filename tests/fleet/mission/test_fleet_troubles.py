@@ -38,8 +38,6 @@ def test_a_fleet_of_one_drives_as_a_robot_without_a_fleet():
 
 
 class Crowd(FleetDrive):
-    """Robots that take all messages of a second at once, as a daemon does."""
-
     def tick(self, copies=1, random=None):
         self.seconds += 1
         for robot in self.robots.values():

@@ -27,7 +27,6 @@ def member(x, y):
 
 
 def meet(drive, *heard, at=(2, 4), seconds=1):
-    """Let a robot stand in a cell and hear others, for so many seconds; it gets its plans."""
     for _ in range(seconds):
         drive.tell(pose_at(*at), *heard, after=1.0)
         if drive.request is not None:
@@ -35,7 +34,6 @@ def meet(drive, *heard, at=(2, 4), seconds=1):
 
 
 def planned(**policy):
-    """A robot, r1, in a hall that has its first path."""
     drive = Drive((2, 4), config=with_policy(CONFIG, **policy), kind=FleetKind("r1"))
     drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
     drive.plan()

@@ -44,7 +44,6 @@ WEST = [(1.2, 0.0), (0.0, 0.0)]
 
 
 def robots(case, name, line, waits_for, other, others_line, held_by, reason):
-    """Two robots, each with its line and whom it waits for; why the first may not go on."""
     return pytest.param(
         name, line, waits_for, heard(other, *others_line, waits_for=held_by), reason, id=case
     )
@@ -97,7 +96,6 @@ def test_the_other_one_drives_at_its_own_pace():
 
 
 def at(cell):
-    """The middle of a cell."""
     return (cell[1] + 0.5) * 0.25, (cell[0] + 0.5) * 0.25
 
 
@@ -112,8 +110,6 @@ def test_a_path_around_a_standing_robot_is_driven_though_near():
 
 
 def sees_in(area):
-    """Whether two points lie in one cell, or in two that a step connects."""
-
     def sees(a, b):
         first, second = (area.lattice.cell_at(*point) for point in (a, b))
         return 1 <= len(area.shortest_path(first, second)) <= 2

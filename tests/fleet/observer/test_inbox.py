@@ -12,8 +12,6 @@ CAPACITY = 4_000
 
 
 class Box(FleetInbox):
-    """An inbox whose clock counts samples."""
-
     def __init__(self) -> None:
         self.count = 0
         super().__init__(CAPACITY, self._stamped)

@@ -18,7 +18,6 @@ PARTS = tuple(FleetPart(name, *cell, 0.0, 1.2) for name, cell in (("a", (0, 0)),
 
 @pytest.fixture
 def halved():
-    """Two robots that have divided a hall."""
     members = ObservedFleet()
     assert survey_of(members, 0).geometry is None
     for name in ("a", "b"):

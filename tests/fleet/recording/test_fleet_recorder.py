@@ -37,34 +37,27 @@ TEXT = "TextLog:text"
 
 
 class Studio:
-    """A recorder in this process, and the bus that robots talk to it over."""
-
     def __init__(self, bus, recorder, out):
         self.bus, self.recorder, self.out = bus, recorder, out
 
     def pass_time(self, seconds):
-        """Let the recorder work."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             self.recorder.step(0.02)
 
     def until(self, holds, most_s=30.0):
-        """Let the recorder work until something holds."""
         until = time.monotonic() + most_s
         while not holds():
             assert time.monotonic() < until
             self.recorder.step(0.02)
 
     def joined(self, *names):
-        """Tell whether robots are recorded."""
         return {member.name for member in self.recorder._members} >= set(names)
 
     def shows(self, name):
-        """Tell whether a robot's map is drawn."""
         return self.recorder._scene._drawn[name].known is not None
 
     def parts(self):
-        """End the recording; return its parts."""
         assert self.recorder.end()
         return sorted(self.out.glob("*.rrd"))
 
@@ -85,7 +78,6 @@ def studio(tmp_path):
 
 
 def log_of(part):
-    """Return the lines of the log."""
     return [str(line[0]) for line in read_column(part, entities.FLEET_LOG, TEXT).values]
 
 

@@ -30,7 +30,6 @@ GROUND = [(row, col) for row in range(8) for col in range(12)]
 
 
 def noted(robot, way, begin_s, *, waits=(), scale=1.0):
-    """Return notes of a robot that comes into a cell a second, and has swept it then."""
     swept, notes = [], []
     for second, cell in enumerate(way):
         swept.append(cell)
@@ -47,13 +46,11 @@ def noted(robot, way, begin_s, *, waits=(), scale=1.0):
 
 
 def lane(row, first, last):
-    """Return the cells of a row, from one column to another."""
     step = 1 if last >= first else -1
     return [(row, col) for col in range(first, last + step, step)]
 
 
 def reviewed(monkeypatch, *ways, waits=(), begin_s=0, scale=1.0):
-    """Return the review of robots that drive one after another."""
     robots = [
         NotedRobot(f"r{number + 1}", 0.2, CELL_M, 0.0, 0.0, 0.0, 0.0) for number in range(len(ways))
     ]

@@ -24,7 +24,6 @@ HOUSE = FleetSettings("house")
 
 
 def turns(*said):
-    """Return the turn log of a robot that took these messages of (robot, message)."""
     told = SampleEncoder(0)
     for robot, message in said:
         sample = Sample(f"fasaco/@v1/{robot}/fleet", encode_json(message))
@@ -34,7 +33,6 @@ def turns(*said):
 
 
 def cells(mask):
-    """Return the cells with all their pixels in a mask, and check that no pixel lies elsewhere."""
     found = {((row - 2) // 2, (col - 2) // 2) for row, col in np.argwhere(mask).tolist()}
     assert np.count_nonzero(mask) == 4 * len(found)
     return found

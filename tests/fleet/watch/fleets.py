@@ -18,19 +18,16 @@ AHEAD = ((1.3, 1.0), (1.6, 1.0), (1.6, 2.5))
 
 
 def tell(view: FleetView, robot: str, topic: str, payload: bytes, now: float = NOW) -> None:
-    """Let a sample come."""
     sample = Sample(f"fasaco/@v1/{robot}/{topic}", payload)
     at_ns = int(1e9 * now)
     view.take(RobotSample(robot, Arrival(topic, sample, at_ns, at_ns)))
 
 
 def say(view: FleetView, robot: str, now: float = NOW, **members: Any) -> None:
-    """Let a robot tell its fleet something, see ``member``."""
     tell(view, robot, "fleet", encode_json(member(**members)), now)
 
 
 def two_in_a_hall() -> FleetView:
-    """Return the view of two robots: one drives east, the other waits for it."""
     view = FleetView("house")
     lane = [(2, col) for col in range(4)]
     ours = {"division": 7, "by": "b", "parts": PARTS}

@@ -17,7 +17,6 @@ from tests.watch.test_page import SIZES
 
 
 def page_of(view: FleetView, width: int = 100, height: int = 30, now: float = NOW) -> str:
-    """Return what is seen without colours."""
     lines = FleetPage(console(width, colours=None)).lines(view, now, width, height)
     return "\n".join(plain(line) for line in lines)
 

@@ -17,10 +17,7 @@ from fasaco_edge.fleet.watch import view as fleet_view
 from fasaco_edge.fleet.watch.view import LONGEST, MOST_FAULTS, MOST_FLEETS, FleetView
 from fasaco_edge.wire.documents.fleet import CellTile, FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.limits import (
-    MAX_FLEET_PARTS,
-    MAX_FLEET_TILES,
-)
+from fasaco_edge.wire.limits import MAX_FLEET_PARTS, MAX_FLEET_TILES
 from tests.fleet.told import member
 from tests.fleet.watch.fleets import PARTS, say, tell, two_in_a_hall
 from tests.watch.grids import NOW, status

@@ -19,12 +19,7 @@ from fasaco_edge.wire.keys import Keys
 from tests.fleet.told import Teller
 from tests.fleet.watch.fleets import AHEAD, PARTS
 from tests.support.outsider import Outsider
-from tests.support.processes import (
-    daemon_process,
-    fasaco_edge,
-    free_endpoint,
-    mapped_files,
-)
+from tests.support.processes import daemon_process, fasaco_edge, free_endpoint, mapped_files
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.waiting import meanwhile
 from tests.watch.terminal import Terminal, piped
@@ -35,8 +30,6 @@ HALL = room(9.0, 6.0)
 
 
 class Hall:
-    """Robots of the fleet `house` that stand in a hall and tell of it, until they fall silent."""
-
     def __init__(self, bus: Bus, *names: str, **members: Any) -> None:
         self.tellers = {name: Teller(bus, name) for name in names}
         ours = {"division": 7, "by": "b", "parts": PARTS, **members}
@@ -45,7 +38,6 @@ class Hall:
         self.silent: set[str] = set()
 
     def published(self) -> contextlib.AbstractContextManager[None]:
-        """Publish a message of each, again and again."""
         return meanwhile(self._publish, EVERY_S)
 
     def _publish(self) -> None:
@@ -56,7 +48,6 @@ class Hall:
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[tuple[Hall, str]]:
-    """Two robots of one fleet, one of another, and their endpoint."""
     endpoint = free_endpoint()
     with (
         open_bus(BusSettings("router", (), (endpoint,))) as bus,
@@ -92,9 +83,7 @@ def test_it_shows_all_robots(hall):
         terminal.wait_text("b is gone")
         robots.silent.clear()
         terminal.wait_text("b is back: waits for a")
-        terminal.type("q")
-        assert terminal.end() == 0
-        assert terminal.is_clean()
+        terminal.quit()
         assert "Traceback" not in terminal.written
 
 
@@ -157,9 +146,7 @@ def test_it_outlives_the_router():
             with open_bus(router) as bus, Hall(bus, "a", "b", state=state).published():
                 terminal.wait_text("2 of 2 robots at work")
                 terminal.wait_text(f"b     {state}")
-        terminal.type("q")
-        assert terminal.end() == 0
-        assert terminal.is_clean()
+        terminal.quit()
 
 
 def test_daemons_of_a_fleet_are_shown(tmp_path):
