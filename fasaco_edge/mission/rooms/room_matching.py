@@ -39,7 +39,7 @@ from fasaco_edge.mission.rooms.room_raster import BLOCK, Ids, RoomRaster, cut_wi
 Labels = NDArray[np.int32]
 
 # A new region must last HOLD_NEW updates, another change HOLD_CHANGE updates.
-HOLD_NEW, HOLD_CHANGE = 4, 8
+HOLD_NEW, HOLD_CHANGE = 4, 32
 # Squares have settled in a room after 1 to 2 times this number of updates.
 SETTLED = 2 * HOLD_CHANGE
 # Decrease of a change's score with an update that does not show it.
