@@ -1,17 +1,17 @@
-"""Search of an offline plan: for walks, and for the line along the best of them, within a budget.
+"""Search of an offline plan: for a walk, and for the line along it, within a budget.
 
-A line is laid along each of two walks and annealed three times; then the better line is improved
-until the budget ends. The first walk and line are always completed, unless Ctrl-C cuts them. The
-steps do not depend on the budget, so a larger budget never gives a worse line (by its seconds, plus
-the price of unswept floor). If a share of the floor is requested, the first line is always annealed
-three times, to find out how much unswept floor must cost for this share. A planner without local
-search searches for one walk until the budget ends.
+The walk is searched for first, then the line is annealed until the budget ends. The walk and the
+first stage of the line are always completed, unless Ctrl-C cuts them. The steps do not depend on
+the budget, so a larger budget never gives a worse line (by its seconds, plus the price of unswept
+floor). If a share of the floor is requested, the line is always annealed three times, to find out
+how much unswept floor must cost for this share. A planner without local search searches for a walk
+until the budget ends.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.offline.ground import Line, PlanGround, line_through
@@ -24,41 +24,35 @@ from fasaco_edge.planners.own.problem import OwnPlanner
 from fasaco_edge.planners.own.time_limit import OWN_BUDGET_S
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
-    ColonySnapshot,
     CoveragePlanner,
     Observer,
     SearchProgress,
     StoppingCriterion,
     WorkLimit,
-    ignore,
 )
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 
-# Limit on the proposals per cell of a walk's search: with more, searching for the line gains more.
-# Limit on all proposals of the first walk, which has no budget: some five seconds.
-PROPOSALS_A_CELL, FIRST_PROPOSALS = 10_000, 25_000_000
-# Number of stages after which two lines are compared.
-COMPARED = 3
-# Bit that differs in the seed of the second walk.
-SECOND_SEED = 1 << 20
+# Limits on the proposals of a walk's search, per cell and in all: with more, searching for the line
+# gains more, and the walk has no budget (some five seconds).
+PROPOSALS_A_CELL, MOST_PROPOSALS = 10_000, 25_000_000
+# Number of stages that a line with a requested share always gets.
+PRICED_STAGES = 3
 
 
 class SearchEnd:
-    """Decides when the searches for walks, and for the line along one, end.
+    """Decides when the searches for a walk, and for the line along it, end.
 
     Args:
-        stop: ends all searches; None for never.
-        budget: ends all searches but those for the first walk and the line along it; None for no
-            limit.
+        stop: ends both searches; None for never.
+        budget: ends both, but neither a walk with a limit nor the first stage of the line; None for
+            no limit.
         watch: called with the progress.
         bound: see below.
 
     Attributes:
         by: what ended the searches.
         bound: the problem's lower bound, for planners that do not compute it.
-        is_walk_limited: whether the limit on proposals ended the last search for a walk.
-        is_walk_cut: whether ``budget`` or ``stop`` ended it.
     """
 
     def __init__(
@@ -69,27 +63,22 @@ class SearchEnd:
         bound: LowerBound | None,
     ) -> None:
         self.by, self.bound = "the search", bound
-        self.is_walk_limited = self.is_walk_cut = False
-        self._watch, self._stop, self._budget, self._is_first = watch, stop, budget, False
+        self._watch, self._stop, self._budget = watch, stop, budget
         self._progress: SearchProgress | None = None
         self._limit: StoppingCriterion | None = None
 
-    def limit_walk(self, proposals: int, *, is_first: bool) -> None:
-        """End the next search for a walk after ``proposals``; the first has no budget."""
+    def limit_walk(self, proposals: int) -> None:
+        """End the search for a walk after a number of proposals, not by the budget."""
         self._limit = WorkLimit(SearchWork(proposals=proposals))
-        self.is_walk_limited = self.is_walk_cut = False
-        self._is_first = is_first
 
     def is_walk_over(self, progress: SearchProgress) -> bool:
         """Return whether the search for a walk is over."""
         if self.bound is not None:
             progress = replace(progress, lower_bound_cost_s=self.bound.cost_s)
         self._progress = progress
-        self.is_walk_cut = self._is_over(progress)
-        if self.is_walk_cut:
-            return True
-        self.is_walk_limited = self._limit is not None and self._limit(progress)
-        return self.is_walk_limited
+        if self._limit is None:
+            return self._is_over(progress, self._budget)
+        return self._is_over(progress, None) or self._limit(progress)
 
     def is_interrupted(self) -> bool:
         """Return whether ``stop`` ends the plan even within the first stage of the first line."""
@@ -100,54 +89,24 @@ class SearchEnd:
         return is_cut
 
     def is_stopped(self) -> bool:
-        """Return whether ``stop`` ends the search for the first line, which has no budget."""
-        return self._progress is not None and self._is_over(self._progress)
+        """Return whether ``stop`` ends the search for the line, regardless of the budget."""
+        return self._progress is not None and self._is_over(self._progress, None)
 
     def is_line_over(self) -> bool:
         """Return whether the search for a line is over; without a budget it ends at once."""
-        self._is_first = False
-        return self._budget is None or self._progress is None or self._is_over(self._progress)
+        if self._budget is None or self._progress is None:
+            return True
+        return self._is_over(self._progress, self._budget)
 
-    def _is_over(self, progress: SearchProgress) -> bool:
+    def _is_over(self, progress: SearchProgress, budget: StoppingCriterion | None) -> bool:
         self._watch(progress)
         if self._stop is not None and self._stop(progress):
             self.by = "Ctrl-C"
             return True
-        if self._budget is not None and not self._is_first and self._budget(progress):
+        if budget is not None and budget(progress):
             self.by = "budget"
             return True
         return False
-
-
-@dataclass(frozen=True, slots=True)
-class _Laid:
-    """A walk, the running search for the line along it, and the colony's pheromone."""
-
-    path: CoveragePath
-    line: LineSearch
-    pieces: Iterator[None]
-    snapshots: list[ColonySnapshot]
-
-    def complete(self, stages: int, stop: Callable[[], bool] = lambda: False) -> bool:
-        """Search to the end of stage number ``stages``; return False if stopped earlier.
-
-        Stopped within the first stage, it keeps the line of that moment.
-        """
-        for _ in self.pieces:
-            if self.line.stages >= stages:
-                return True
-            if stop():
-                if self.line.best is None:
-                    self.line.keep()
-                return False
-        return True
-
-    def improve(self, stop: Callable[[], bool]) -> None:
-        """Search until stopped, or until no moves are left."""
-        if not stop():
-            for _ in self.pieces:
-                if stop():
-                    return
 
 
 class Planning:
@@ -181,58 +140,47 @@ class Planning:
             line: CELLS, or one of ``planners.line.LINES``.
             robot: its driving parameters.
         """
-        if line == CELLS:
-            path = self._walk(self._search.seed, self._observe)
-            return path, line_through(self._ground.lattice, path.cells)
-        laid = self._begin(line, robot)
-        laid.improve(self._ending.is_line_over)
-        for snapshot in laid.snapshots:
-            self._observe(snapshot)
-        assert laid.line.best is not None
-        return laid.path, laid.line.best.xy
-
-    def _begin(self, line: str, robot: RobotConfig) -> _Laid:
-        """Return the walk with the better line of two walks.
-
-        Without local search, or if the first search ended by itself, there is only one walk.
-        """
         search, ending = self._search, self._ending
-        has_two = search.has_local_search
-        most = PROPOSALS_A_CELL * self._problem.cells
-        ending.limit_walk(min(most, FIRST_PROPOSALS) if has_two else most, is_first=has_two)
-        best = self._lay(line, robot, search.seed, is_one_of_two=has_two)
-        best.complete(1, ending.is_interrupted)
-        if search.swept is not None:
-            best.complete(COMPARED, ending.is_stopped)
-        may_go_on = has_two and ending.is_walk_limited and not ending.is_line_over()
-        if not may_go_on or not best.complete(COMPARED, ending.is_line_over):
-            return best
-        ending.limit_walk(most, is_first=False)
-        other = self._lay(line, robot, search.seed ^ SECOND_SEED, is_one_of_two=True)
-        is_laid = not ending.is_walk_cut and other.complete(COMPARED, ending.is_line_over)
-        return other if is_laid and other.line.rank < best.line.rank else best
+        if line != CELLS and search.has_local_search:
+            most = PROPOSALS_A_CELL * self._problem.cells
+            ending.limit_walk(min(most, MOST_PROPOSALS))
+        path = self._walk()
+        if line == CELLS:
+            return path, line_through(self._ground.lattice, path.cells)
+        ends = self._problem.end is not None
+        laid = self._ground.line_search(path.cells, line, robot, ends=ends, swept=search.swept)
+        self._improve(laid)
+        assert laid.best is not None
+        return path, laid.best.xy
 
-    def _lay(self, line: str, robot: RobotConfig, seed: int, *, is_one_of_two: bool) -> _Laid:
-        """Search for a walk, and prepare the search for the line along it.
+    def _improve(self, line: LineSearch) -> None:
+        """Search for the line along a walk, as long as that may go on.
 
-        With two walks, the pheromone is shown once the better walk is known.
+        Stopped within the first stage, the search keeps the line of that moment.
         """
-        snapshots: list[ColonySnapshot] = []
-        is_shown_later = is_one_of_two and self._observe is not ignore
-        path = self._walk(seed, snapshots.append if is_shown_later else self._observe)
-        ends, swept = self._problem.end is not None, self._search.swept
-        search = self._ground.line_search(path.cells, line, robot, ends=ends, swept=swept)
-        return _Laid(path, search, search.run(), snapshots)
+        ending = self._ending
+        for _ in line.run():
+            if not line.stages:
+                is_over = ending.is_interrupted()
+            elif line.stages < PRICED_STAGES and self._search.swept is not None:
+                is_over = ending.is_stopped()
+            else:
+                is_over = ending.is_line_over()
+            if is_over:
+                break
+        if line.best is None:
+            line.keep()
 
-    def _walk(self, seed: int, observe: Observer) -> CoveragePath:
+    def _walk(self) -> CoveragePath:
         """Search for a walk; a planner without a lower bound is given one for its path."""
         search, bound = self._search, self._ending.bound
+        most_s = OWN_BUDGET_S if search.most_s is None else search.most_s
         planner: CoveragePlanner = (
-            OwnPlanner(self._own, seed, OWN_BUDGET_S if search.most_s is None else search.most_s)
+            OwnPlanner(self._own, search.seed, most_s)
             if self._own
-            else planner_of(search.planner, replace(search.colony(), seed=seed), search.threads)
+            else planner_of(search.planner, search.colony(), search.threads)
         )
-        path = planner.plan(self._problem, self._ending.is_walk_over, observe)
+        path = planner.plan(self._problem, self._ending.is_walk_over, self._observe)
         path = replace(path, seed=search.seed)
         if bound is not None:
             path = replace(path, lower_bound_steps=bound.steps, lower_bound_cost_s=bound.cost_s)

@@ -220,12 +220,6 @@ class LineSearch:
         least = self._config.swept or 0.0
         return max(least * self._floor.reachable_m2 - swept_m2, 0.0)
 
-    @property
-    def rank(self) -> tuple[float, float]:
-        """The objective: floor missing from the requested share [m2], then the cost [s]."""
-        assert self.best is not None
-        return self._rank(self.best)
-
     def keep(self) -> None:
         """Keep the present line if it is better than the kept line; also within a stage."""
         points = straightened(self._line.points[numbers_along(self._line)])

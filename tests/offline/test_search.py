@@ -1,4 +1,4 @@
-"""Search of a plan: more of it is never worse, and the better of two walks goes on."""
+"""Search of a plan: more of it is never worse."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ from fasaco_edge.offline.plan import _problem
 from fasaco_edge.offline.search import Planning, SearchEnd
 from fasaco_edge.offline.settings import ANYWHERE, WALLS
 from fasaco_edge.planners.bound import lower_bound_of
-from fasaco_edge.planners.line import LINES, LineSearch, _sweeps, anneal, memory_for_moves
+from fasaco_edge.planners.line import LINES, _sweeps, anneal, memory_for_moves
 from fasaco_edge.planners.planner import Interrupt, ignore
 
 ROBOT = fe.Robot()
-# Pauses after which a search is stopped; the second walk begins after some ninety, and the better
-# of the two lines goes on from some hundred and thirty.
+# Pauses after which a search is stopped.
 BUDGETS = 1, 40, 95, 150, 400
 
 
@@ -76,27 +75,6 @@ def test_more_of_a_search_is_never_worse(seed):
     costs = [cost_s(*planned(room(seed), seed, Pauses(most))[::2]) for most in BUDGETS]
     assert all(b <= a + 1e-3 for a, b in pairwise(costs)), costs
     assert costs[-1] < costs[0]
-
-
-@pytest.mark.parametrize("better", [0, 1])
-def test_the_better_of_two_walks_is_improved(monkeypatch, better):
-    """Whichever line is the better one, its walk and its pheromone are those of the plan."""
-    seen, searches = [], []
-    laid = PlanGround.line_search
-
-    def line_search(self, walk, *args, **kwargs):
-        searches.append((walk, laid(self, walk, *args, **kwargs)))
-        return searches[-1][1]
-
-    monkeypatch.setattr(PlanGround, "line_search", line_search)
-    rank = property(lambda line: float(line is not searches[better][1]))
-    monkeypatch.setattr(LineSearch, "rank", rank)
-    _, path, xy = planned(room(2), 1, Pauses(400), seen.append)
-    assert len(searches) == 2
-    assert path.cells.tolist() == searches[better][0].tolist()
-    assert xy is searches[better][1].best.xy
-    assert len(seen) == 1
-    assert searches[0][0].tolist() != searches[1][0].tolist()
 
 
 def test_pheromone_is_shown_while_only_ants_walk():

@@ -71,10 +71,9 @@ colony-search finds a complete walk within milliseconds, and improves it by loca
 perturbations; in every other perturbation ants rebuild a part of the walk. It ends when its
 budget is used, the walk is proven optimal, or nothing has been gained for long.
 
-A line over the floor is laid along each of two walks, if the budget allows. The rest of the
-budget improves the better line: each stage of the search takes twice as long as the stage
-before. A larger budget never gives a worse line, by its seconds and the price of the floor
-that it leaves.
+A line over the floor is laid along this walk. The rest of the budget improves the line: each
+stage of the search takes twice as long as the stage before. A larger budget never gives a worse
+line, by its seconds and the price of the floor that it leaves.
 
 --ants and --velocities apply to fasaco, --ants to aco, --velocities to colony-search; a planner
 of your own gets the seed. The Python interface has more settings of the colony.
