@@ -36,9 +36,10 @@ MOST_A_POINT = 2000
 # Temperatures of the first stage; temperatures of each later stage, low enough for the line to keep
 # its overall shape. Stages of doubled length are as good as one stage of their total length.
 COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
-# Factors on the price of floor if a share to sweep is requested: after a line that sweeps too
-# little; after a line that sweeps enough; limit on their product. Large factors need few stages.
-RAISED, LOWERED, MOST_RAISED = 4.0, 0.7, 100.0
+# If a share to sweep is requested, each stage scales the price of floor by the floor that the line
+# left over AIMED of the floor that it may leave, to the power of 1.5, by at most MOST_CHANGE or its
+# inverse. MOST_RAISED limits the price over its usual value.
+AIMED, MOST_CHANGE, MOST_RAISED = 0.9, 4.0, 100.0
 # Moves per point of the line after which its parts are reordered once.
 MOVES_A_POINT = 48
 # Limit on the moves between two pauses: about a quarter of a second.
@@ -205,11 +206,18 @@ class LineSearch:
         yield
 
     def _adapt_price(self) -> None:
-        """Raise the price of floor if the last line swept too little; otherwise lower it."""
-        if self._config.swept is not None:
-            change = RAISED if self._missing_m2(self._swept_m2()) > 0.0 else LOWERED
-            left_s = min(self._price.left_s * change, MOST_RAISED * self._least_price.left_s)
-            self._price = self._price._replace(left_s=max(left_s, self._least_price.left_s))
+        """Change the price of floor so that the next line sweeps little more than requested."""
+        if self._config.swept is None:
+            return
+        reachable_m2 = self._floor.reachable_m2
+        may_leave_m2 = AIMED * (1.0 - self._config.swept) * reachable_m2
+        change = MOST_CHANGE
+        if may_leave_m2 > 0.0:
+            excess = (reachable_m2 - self._swept_m2()) / may_leave_m2
+            change = excess * math.sqrt(excess)  # exact on all machines, unlike a power
+        least_s, left_s = self._least_price.left_s, self._price.left_s
+        left_s *= min(max(change, 1.0 / MOST_CHANGE), MOST_CHANGE)
+        self._price = self._price._replace(left_s=min(max(left_s, least_s), MOST_RAISED * least_s))
 
     def _swept_m2(self) -> float:
         unit = self._floor.geometry.resolution
