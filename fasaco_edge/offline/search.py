@@ -81,7 +81,7 @@ class SearchEnd:
         return self._is_over(progress, None) or self._limit(progress)
 
     def is_interrupted(self) -> bool:
-        """Return whether ``stop`` ends the plan even within the first stage of the first line."""
+        """Return whether ``stop`` ends the plan even within the first stage of its line."""
         if self._progress is not None:
             self._watch(self._progress)
         is_cut = bool(getattr(self._stop, "cuts_first_line", False))
